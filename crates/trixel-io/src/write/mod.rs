@@ -1,0 +1,1 @@
+//! Volume writers: one file a format.
