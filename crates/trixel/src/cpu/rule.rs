@@ -1,0 +1,163 @@
+//! The modes as thresholds: DESIGN's factored forms of the definitions.
+//!
+//! With voxel indices p, an edge of a projection is `n.p >= t` and the plane is `d1 <= N.p <= d2`. A mode is what it
+//! makes of t, d1 and d2. The forms follow [HCV] figures 6.1 and 6.2, in integers.
+
+use super::number::Int;
+use crate::lattice::STEPS_PER_VOXEL;
+
+/// S, the lattice steps of a voxel.
+const S: i64 = STEPS_PER_VOXEL as i64;
+
+/// What distinguishes one mode from another.
+pub(super) trait Rule: Copy + Send + Sync {
+    /// Whether the two projections that contain z constrain the run, and the triangle's box does; otherwise the plane
+    /// alone gives the run's ends.
+    const SURFACE: bool;
+
+    /// Whether a triangle without extent in two axes sets every voxel of its box.
+    const BOX_IS_ENOUGH: bool;
+
+    /// Whether a run goes on to the top of the clip whatever the plane's upper bound.
+    const TO_TOP: bool = false;
+
+    /// Whether 64-bit arithmetic is exact for small triangles.
+    #[inline(always)]
+    fn fits_small(&self) -> bool {
+        true
+    }
+
+    /// The t of `n.p >= t` for an edge with inward normal `(na, nb)` and `nv = n.v`.
+    fn edge<T: Int>(&self, na: T, nb: T, nv: T) -> T;
+
+    /// `(d1, d2)` for the normal `n` (with `n[2] >= 0`) and the corner `v0` in local lattice coordinates.
+    fn plane<T: Int>(&self, n: [T; 3], v0: [i64; 3]) -> (T, T);
+}
+
+/// `N.p + floor or ceil of the rest`, where `v0 = S p + rest`: keeps the products small. Gives N.p and N.(rest + shift).
+#[inline(always)]
+fn split<T: Int>(n: [T; 3], v0: [i64; 3], shift: [i64; 3]) -> (T, T) {
+    let whole = |i: usize| n[i] * T::from(v0[i].div_euclid(S));
+    let rest = |i: usize| n[i] * T::from(v0[i].rem_euclid(S) + shift[i]);
+    (whole(0) + whole(1) + whole(2), rest(0) + rest(1) + rest(2))
+}
+
+#[inline(always)]
+fn ceil_voxels<T: Int>(value: T) -> T {
+    (value + T::from(S - 1)).floor_voxels()
+}
+
+#[inline(always)]
+fn abs<T: Int>(value: T) -> T {
+    value.max(-value)
+}
+
+/// [`crate::Mode::Conservative`].
+#[derive(Clone, Copy)]
+pub(super) struct Conservative;
+
+impl Rule for Conservative {
+    const SURFACE: bool = true;
+    const BOX_IS_ENOUGH: bool = true;
+
+    #[inline(always)]
+    fn edge<T: Int>(&self, na: T, nb: T, nv: T) -> T {
+        let zero = T::from(0);
+        ceil_voxels(nv) - zero.max(na) - zero.max(nb)
+    }
+
+    #[inline(always)]
+    fn plane<T: Int>(&self, n: [T; 3], v0: [i64; 3]) -> (T, T) {
+        let zero = T::from(0);
+        let (whole, rest) = split(n, v0, [0; 3]);
+        let above = zero.max(n[0]) + zero.max(n[1]) + zero.max(n[2]);
+        let below = zero.min(n[0]) + zero.min(n[1]) + zero.min(n[2]);
+        (whole + ceil_voxels(rest) - above, whole + rest.floor_voxels() - below)
+    }
+}
+
+/// [`crate::Mode::Thin`].
+#[derive(Clone, Copy)]
+pub(super) struct Thin;
+
+impl Rule for Thin {
+    const SURFACE: bool = true;
+    const BOX_IS_ENOUGH: bool = false;
+
+    #[inline(always)]
+    fn edge<T: Int>(&self, na: T, nb: T, nv: T) -> T {
+        ceil_voxels(nv - T::from(S / 2) * (na + nb + abs(na).max(abs(nb))))
+    }
+
+    #[inline(always)]
+    fn plane<T: Int>(&self, n: [T; 3], v0: [i64; 3]) -> (T, T) {
+        let half = T::from(S / 2);
+        let (whole, rest) = split(n, v0, [-S / 2; 3]);
+        let reach = half * abs(n[0]).max(abs(n[1])).max(abs(n[2]));
+        (whole + ceil_voxels(rest - reach), whole + (rest + reach).floor_voxels())
+    }
+}
+
+/// The t of an edge whose inside is judged at the voxel's centre, shifted by (+e, +e^2) when it lies on the edge.
+#[inline(always)]
+fn centre_edge<T: Int>(na: T, nb: T, nv: T) -> T {
+    let zero = T::from(0);
+    let inclusive = na > zero || na == zero && nb > zero;
+    ceil_voxels(nv - T::from(S / 2) * (na + nb) + T::from(i64::from(!inclusive)))
+}
+
+/// [`crate::Mode::Solid`]: d1 gives the lowest voxel whose centre is not below the triangle; d2 is not used.
+#[derive(Clone, Copy)]
+pub(super) struct Solid;
+
+impl Rule for Solid {
+    const SURFACE: bool = false;
+    const BOX_IS_ENOUGH: bool = false;
+    const TO_TOP: bool = true;
+
+    #[inline(always)]
+    fn edge<T: Int>(&self, na: T, nb: T, nv: T) -> T {
+        centre_edge(na, nb, nv)
+    }
+
+    #[inline(always)]
+    fn plane<T: Int>(&self, n: [T; 3], v0: [i64; 3]) -> (T, T) {
+        let (whole, rest) = split(n, v0, [-S / 2; 3]);
+        let d1 = whole + ceil_voxels(rest);
+        (d1, d1)
+    }
+}
+
+/// [`crate::Mode::Sliced`].
+#[derive(Clone, Copy)]
+pub(super) struct Sliced {
+    /// The overlap, in lattice steps.
+    pub(super) overlap: i64,
+}
+
+impl Rule for Sliced {
+    const SURFACE: bool = false;
+    const BOX_IS_ENOUGH: bool = false;
+
+    #[inline(always)]
+    fn fits_small(&self) -> bool {
+        // The overlap adds itself times N_z to the numerators, which have room for two voxels of it.
+        self.overlap < 2 * S
+    }
+
+    #[inline(always)]
+    fn edge<T: Int>(&self, na: T, nb: T, nv: T) -> T {
+        centre_edge(na, nb, nv)
+    }
+
+    #[inline(always)]
+    fn plane<T: Int>(&self, n: [T; 3], v0: [i64; 3]) -> (T, T) {
+        // Whole voxels of overlap go to the whole part, so that the rest stays small.
+        let (whole, rest) = split(n, v0, [-S / 2, -S / 2, 0]);
+        let overlap_whole = n[2] * T::from(self.overlap.div_euclid(S));
+        let overlap_rest = n[2] * T::from(self.overlap.rem_euclid(S));
+        let low = whole - overlap_whole + ceil_voxels(rest - overlap_rest) - n[2];
+        let high = whole + overlap_whole + (rest + overlap_rest).floor_voxels();
+        (low, high)
+    }
+}

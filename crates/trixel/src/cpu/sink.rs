@@ -1,0 +1,85 @@
+//! Where the kernel's runs go: bits of a slab of columns.
+
+use crate::volume::WORD_BITS;
+
+/// Receives runs of voxels.
+pub(super) trait Sink {
+    /// The voxels `(x, y, from..=to)`, all inside the clip that the kernel was given.
+    fn run(&mut self, x: i64, y: i64, from: i64, to: i64);
+}
+
+/// The words of the columns with `x` in a range: what one thread owns.
+pub(super) struct Slab<'a> {
+    pub(super) words: &'a mut [u64],
+    pub(super) x_start: i64,
+    /// Columns along y.
+    pub(super) columns: usize,
+    pub(super) column_words: usize,
+}
+
+impl Slab<'_> {
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
+    fn column(&mut self, x: i64, y: i64) -> &mut [u64] {
+        let start = ((x - self.x_start) as usize * self.columns + y as usize) * self.column_words;
+        &mut self.words[start..start + self.column_words]
+    }
+}
+
+/// Sets the voxels of a run.
+pub(super) struct SetRuns<'a>(pub(super) Slab<'a>);
+
+impl Sink for SetRuns<'_> {
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
+    fn run(&mut self, x: i64, y: i64, from: i64, to: i64) {
+        let (from, to) = (from as u32, to as u32);
+        let column = self.0.column(x, y);
+        let (first, last) = ((from / WORD_BITS) as usize, (to / WORD_BITS) as usize);
+        let from_bits = u64::MAX << (from % WORD_BITS);
+        let to_bits = u64::MAX >> (WORD_BITS - 1 - to % WORD_BITS);
+        if first == last {
+            column[first] |= from_bits & to_bits;
+        } else {
+            column[first] |= from_bits;
+            column[first + 1..last].fill(u64::MAX);
+            column[last] |= to_bits;
+        }
+    }
+}
+
+/// Toggles the lowest voxel of a run; [`prefix_xor`] turns toggles into the parity of each voxel.
+pub(super) struct ToggleRuns<'a>(pub(super) Slab<'a>);
+
+impl Sink for ToggleRuns<'_> {
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
+    fn run(&mut self, x: i64, y: i64, from: i64, _to: i64) {
+        let from = from as u32;
+        self.0.column(x, y)[(from / WORD_BITS) as usize] ^= 1 << (from % WORD_BITS);
+    }
+}
+
+/// Replaces every bit of each column by the parity of the bits up to and including it.
+pub(super) fn prefix_xor(words: &mut [u64], column_words: usize, nz: u32) {
+    let last_bits = u64::MAX >> ((WORD_BITS - nz % WORD_BITS) % WORD_BITS);
+    for column in words.chunks_exact_mut(column_words) {
+        let mut carry = 0u64;
+        for word in column.iter_mut() {
+            if *word == 0 && carry == 0 {
+                continue;
+            }
+            let mut parity = *word;
+            for shift in [1, 2, 4, 8, 16, 32] {
+                parity ^= parity << shift;
+            }
+            parity ^= carry;
+            *word = parity;
+            // All ones if the column is inside at this word's end.
+            carry = 0u64.wrapping_sub(parity >> (WORD_BITS - 1));
+        }
+        if let Some(last) = column.last_mut() {
+            *last &= last_bits;
+        }
+    }
+}
