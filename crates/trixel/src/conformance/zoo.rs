@@ -132,7 +132,7 @@ pub fn cube(low: [f64; 3], edge: f64) -> Mesh {
 pub fn octahedron(centre: [f64; 3], radius: f64) -> Mesh {
     let tip = |i: usize| {
         let mut p = centre;
-        p[i / 2] += if i % 2 == 0 { radius } else { -radius };
+        p[i / 2] += if i.is_multiple_of(2) { radius } else { -radius };
         p
     };
     let faces = vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];

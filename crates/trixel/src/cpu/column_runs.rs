@@ -7,8 +7,10 @@
 
 use super::number::{FloorLine, Int, SMALL_EXTENT};
 use super::rule::Rule;
+use super::setup::{Constraint, Setup};
 use super::sink::Sink;
-use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
+use super::small::{self, TILED_EXTENT};
+use crate::lattice::STEP_BITS;
 
 /// Buffers that one thread keeps between triangles.
 #[derive(Default)]
@@ -28,17 +30,18 @@ impl VoxelBox {
     /// The voxels whose closed cubes meet the triangle's closed bounding box.
     #[inline(always)]
     pub(super) fn around([a, b, c]: &[[i64; 3]; 3]) -> Self {
-        let low = std::array::from_fn(|i| (a[i].min(b[i]).min(c[i]) - 1) >> STEP_BITS);
-        let high = std::array::from_fn(|i| a[i].max(b[i]).max(c[i]) >> STEP_BITS);
-        Self { low, high }
+        let low = |i: usize| (a[i].min(b[i]).min(c[i]) - 1) >> STEP_BITS;
+        let high = |i: usize| a[i].max(b[i]).max(c[i]) >> STEP_BITS;
+        Self { low: [low(0), low(1), low(2)], high: [high(0), high(1), high(2)] }
     }
 
     /// The part inside `other`, or `None` if there is none.
     #[inline(always)]
     fn clipped(&self, other: &Self) -> Option<Self> {
-        let low: [i64; 3] = std::array::from_fn(|i| self.low[i].max(other.low[i]));
-        let high: [i64; 3] = std::array::from_fn(|i| self.high[i].min(other.high[i]));
-        (0..3).all(|i| low[i] <= high[i]).then_some(Self { low, high })
+        let low = |i: usize| self.low[i].max(other.low[i]);
+        let high = |i: usize| self.high[i].min(other.high[i]);
+        let (low, high) = ([low(0), low(1), low(2)], [high(0), high(1), high(2)]);
+        (low[0] <= high[0] && low[1] <= high[1] && low[2] <= high[2]).then_some(Self { low, high })
     }
 }
 
@@ -74,7 +77,10 @@ pub(super) fn voxelize_triangle<R: Rule>(
         }
         return;
     }
-    if extent(0).max(extent(1)).max(extent(2)) <= SMALL_EXTENT && rule.fits_small() {
+    let longest = extent(0).max(extent(1)).max(extent(2));
+    if R::SURFACE && longest <= TILED_EXTENT {
+        small::surface(rule, triangle, &around, &clipped, sink);
+    } else if longest <= SMALL_EXTENT && rule.fits_small() {
         general::<i64, R>(rule, triangle, &around, &clipped, sink, scratch);
     } else {
         large(rule, triangle, &around, &clipped, sink, scratch);
@@ -92,14 +98,6 @@ fn large<R: Rule>(
     scratch: &mut Scratch,
 ) {
     general::<i128, R>(rule, triangle, around, clipped, sink, scratch);
-}
-
-/// A constraint `na * a + nb * b >= t` on voxel indices (a, b) of a projection.
-#[derive(Clone, Copy)]
-struct Constraint<T> {
-    na: T,
-    nb: T,
-    t: T,
 }
 
 /// One bound on b that follows a: `low` (b at least) or not (b at most).
@@ -172,30 +170,19 @@ fn general<T: Int, R: Rule>(
     scratch: &mut Scratch,
 ) {
     let zero = T::from(0);
-    // Local coordinates: the box's low corner is the origin, so that numbers stay as small as the triangle.
     let base = around.low;
-    let v = triangle.map(|p| -> [i64; 3] { std::array::from_fn(|i| p[i] - base[i] * i64::from(STEPS_PER_VOXEL)) });
+    let setup = Setup::<T>::new(triangle, base);
     let low: [i64; 3] = std::array::from_fn(|i| clipped.low[i] - base[i]);
     let high: [i64; 3] = std::array::from_fn(|i| clipped.high[i] - base[i]);
 
-    let e: [[T; 3]; 3] = std::array::from_fn(|k| std::array::from_fn(|i| T::from(v[(k + 1) % 3][i] - v[k][i])));
-    let cross = |i: usize, j: usize| e[0][i] * e[1][j] - e[0][j] * e[1][i];
-    let normal = [cross(1, 2), cross(2, 0), cross(0, 1)];
-    if !R::SURFACE && normal[2] == zero {
+    if !R::SURFACE && setup.normal[2] == zero {
         return;
     }
 
-    // Inward normals of the edges in the projection (a, b), whose third axis is c: positive areas turn left.
-    let constraint = |k: usize, a: usize, b: usize, c: usize| {
-        let (na, nb) = if normal[c] < zero { (e[k][b], -e[k][a]) } else { (-e[k][b], e[k][a]) };
-        let nv = na * T::from(v[k][a]) + nb * T::from(v[k][b]);
-        Constraint { na, nb, t: rule.edge(na, nb, nv) }
-    };
-
     let [mut x_low, mut x_high] = [low[0], high[0]];
     let mut y_by_x = Bounds::new();
-    for k in 0..3 {
-        let constraint = constraint(k, 0, 1, 2);
+    let xy = setup.projection(rule, 0, 1);
+    for constraint in xy {
         if !R::SURFACE && constraint.nb == zero {
             // An edge along y limits x alone. (On surfaces the box already implies it.)
             if constraint.na > zero {
@@ -210,17 +197,15 @@ fn general<T: Int, R: Rule>(
     if !R::SURFACE && x_low > low[0] {
         // The bounds start at the first x that is left.
         y_by_x = Bounds::new();
-        for k in 0..3 {
-            y_by_x.push(constraint(k, 0, 1, 2).bound(x_low));
+        for constraint in xy {
+            y_by_x.push(constraint.bound(x_low));
         }
     }
     if x_low > x_high {
         return;
     }
 
-    // The plane, turned so that its normal points up.
-    let up = if normal[2] < zero { normal.map(|c| -c) } else { normal };
-    let (d1, d2) = rule.plane(up, v[0]);
+    let (up, d1, d2) = setup.plane(rule);
     let slanted = up[2] > zero;
     if !slanted {
         // A plane along z limits x and y only: two more edges. Where it is also along y or x, the box implies it.
@@ -231,12 +216,8 @@ fn general<T: Int, R: Rule>(
     let mut z_by_x = Bounds::new();
     if R::SURFACE {
         let mut z_by_y = Bounds::new();
-        for k in 0..3 {
-            // In (y, z) the third axis is x; (x, z) is mirrored against (z, x), whose third axis is y.
-            z_by_y.push(constraint(k, 1, 2, 0).bound(low[1]));
-            let zx = constraint(k, 2, 0, 1);
-            z_by_x.push(Constraint { na: zx.nb, nb: zx.na, t: zx.t }.bound(x_low));
-        }
+        setup.projection(rule, 1, 2).into_iter().for_each(|c| z_by_y.push(c.bound(low[1])));
+        setup.projection(rule, 0, 2).into_iter().for_each(|c| z_by_x.push(c.bound(x_low)));
         scratch.z_by_y.clear();
         scratch.z_by_y.extend((low[1]..=high[1]).map(|_| z_by_y.next([low[2], high[2]])));
     }

@@ -1,6 +1,8 @@
 //! The CPU backend.
 //!
 //! - `column_runs`: the kernel, one triangle at a time
+//! - `small`: its path for triangles of a few voxels
+//! - `setup`: what both compute first
 //! - `rule`: the modes as thresholds
 //! - `number`: exact integers and floor lines
 //! - `sink`: runs into bits, toggles into parity
@@ -9,8 +11,10 @@
 mod column_runs;
 mod number;
 mod rule;
+mod setup;
 mod sink;
 mod slabs;
+mod small;
 
 use crate::backend::{Backend, Error};
 use crate::job::{Job, Strategy};

@@ -36,9 +36,12 @@ impl Int for i64 {
     fn div_floor(self, divisor: Self) -> (Self, Self) {
         debug_assert!(divisor > 0 && self.abs() < 1 << 53 && divisor < 1 << 53);
         // Both are below 2^53, so the rounded quotient never crosses an integer: |a / b - n| >= 1 / b > ulp(a / b) / 2.
+        // Truncated and corrected, because rounding down is a function call on baseline x86-64.
         #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "exact below 2^53")]
-        let quotient = (self as f64 / divisor as f64).floor() as i64;
-        (quotient, self - quotient * divisor)
+        let truncated = (self as f64 / divisor as f64) as i64;
+        let remainder = self - truncated * divisor;
+        let below = remainder >> 63;
+        (truncated + below, remainder + (below & divisor))
     }
 
     #[inline(always)]

@@ -6,6 +6,9 @@ use crate::volume::WORD_BITS;
 pub(super) trait Sink {
     /// The voxels `(x, y, from..=to)`, all inside the clip that the kernel was given.
     fn run(&mut self, x: i64, y: i64, from: i64, to: i64);
+
+    /// The voxels `(x, y, z..z + 4)` whose bits are set in `bits`; those outside the clip are not set. `z` may be below 0.
+    fn four(&mut self, x: i64, y: i64, z: i64, bits: u64);
 }
 
 /// The words of the columns with `x` in a range: what one thread owns.
@@ -46,6 +49,21 @@ impl Sink for SetRuns<'_> {
             column[last] |= to_bits;
         }
     }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
+    fn four(&mut self, x: i64, y: i64, z: i64, bits: u64) {
+        let column = self.0.column(x, y);
+        let (bits, z) = if z < 0 { (bits >> -z, 0) } else { (bits, z as u32) };
+        let (word, shift) = ((z / WORD_BITS) as usize, z % WORD_BITS);
+        column[word] |= bits << shift;
+        if shift > WORD_BITS - 4 {
+            let above = bits >> (WORD_BITS - shift);
+            if above != 0 {
+                column[word + 1] |= above;
+            }
+        }
+    }
 }
 
 /// Toggles the lowest voxel of a run; [`prefix_xor`] turns toggles into the parity of each voxel.
@@ -57,6 +75,11 @@ impl Sink for ToggleRuns<'_> {
     fn run(&mut self, x: i64, y: i64, from: i64, _to: i64) {
         let from = from as u32;
         self.0.column(x, y)[(from / WORD_BITS) as usize] ^= 1 << (from % WORD_BITS);
+    }
+
+    /// Parity needs whole runs: the tiled path is for surfaces.
+    fn four(&mut self, x: i64, y: i64, z: i64, bits: u64) {
+        debug_assert!(false, "a tile of a solid at ({x}, {y}, {z}): {bits:#x}");
     }
 }
 

@@ -18,7 +18,11 @@ pub(super) struct Corners<'a, C> {
 impl<C: Into<i64> + Copy> Corners<'_, C> {
     #[inline(always)]
     fn of(&self, triangle: [u32; 3]) -> [[i64; 3]; 3] {
-        triangle.map(|vertex| self.positions[vertex as usize].map(Into::into))
+        let corner = |vertex: u32| {
+            let [x, y, z] = self.positions[vertex as usize];
+            [x.into(), y.into(), z.into()]
+        };
+        [corner(triangle[0]), corner(triangle[1]), corner(triangle[2])]
     }
 }
 
@@ -213,7 +217,6 @@ mod parallel {
         }
         let mut cuts = vec![0u32];
         for piece in 1..=pieces {
-            #[expect(clippy::cast_possible_wrap, reason = "a few thousand at most")]
             let target = i128::from(total) * piece as i128 / pieces as i128;
             let x = before.partition_point(|&sum| i128::from(sum) < target);
             let x = u32::try_from(x).unwrap_or(dims[0]).min(dims[0]);
