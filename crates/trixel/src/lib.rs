@@ -10,6 +10,7 @@ pub mod lattice;
 mod material;
 mod mesh;
 mod mode;
+mod topology;
 mod volume;
 
 pub use backend::{Backend, Error, voxelize};
@@ -19,4 +20,5 @@ pub use job::{Job, JobError, Strategy};
 pub use material::{AlphaMode, Filter, Image, ImageSource, Material, Texture, TextureRef, Wrap};
 pub use mesh::{Attribute, Bounds, Mesh, MeshError, UpAxis};
 pub use mode::Mode;
+pub use topology::Topology;
 pub use volume::{Bytes, Volume, VolumeError, WORD_BITS, set_bits};
