@@ -43,8 +43,22 @@ trait Source {
     /// The most rows that can still follow, when each takes at least `smallest_row` bytes in binary.
     fn most_rows(&self, smallest_row: usize, properties: usize) -> usize;
 
-    /// Moves over a list and returns it, if it is quickly seen to be one of three indices; else moves nowhere.
-    fn triangle(&mut self, count: Scalar, item: Scalar) -> Option<[u32; 3]>;
+    /// Moves over rows for as long as they are triangles (`rows.offset` bytes into each, a count of 3 and 32-bit indices)
+    /// and appends those, where the encoding lets it do so quickly; returns how many.
+    fn triangles(&mut self, rows: Rows, out: &mut Vec<[u32; 3]>) -> u64;
+
+    /// Moves over all rows and appends the three `f32` that each holds, where the encoding lets it do so quickly;
+    /// otherwise returns `false` and moves nowhere.
+    fn float_triples(&mut self, rows: Rows, out: &mut Vec<[f64; 3]>) -> bool;
+}
+
+/// Rows that all take the same number of bytes in a binary file.
+#[derive(Clone, Copy)]
+struct Rows {
+    count: u64,
+    stride: usize,
+    /// Where in a row the wanted numbers start.
+    offset: usize,
 }
 
 struct Words<'a> {
@@ -73,8 +87,12 @@ impl Source for Words<'_> {
         self.scanner.rest().len() / (2 * properties).max(1)
     }
 
-    fn triangle(&mut self, _count: Scalar, _item: Scalar) -> Option<[u32; 3]> {
-        None
+    fn triangles(&mut self, _rows: Rows, _out: &mut Vec<[u32; 3]>) -> u64 {
+        0
+    }
+
+    fn float_triples(&mut self, _rows: Rows, _out: &mut Vec<[f64; 3]>) -> bool {
+        false
     }
 }
 
@@ -130,25 +148,37 @@ impl<const BIG: bool> Source for Binary<'_, BIG> {
         (self.data.len() - self.at) / smallest_row.max(1)
     }
 
-    fn triangle(&mut self, count: Scalar, item: Scalar) -> Option<[u32; 3]> {
-        if !(count.size() == 1 && matches!(item, Scalar::I32 | Scalar::U32)) {
-            return None;
+    fn triangles(&mut self, rows: Rows, out: &mut Vec<[u32; 3]>) -> u64 {
+        let index = |bytes: [u8; 4]| if BIG { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) };
+        let data = self.data.get(self.at..).unwrap_or_default();
+        let most = usize::try_from(rows.count).unwrap_or(usize::MAX);
+        let before = out.len();
+        for row in data.chunks_exact(rows.stride).take(most) {
+            let Some(&[3, a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3]) = row[rows.offset..].first_chunk() else {
+                break;
+            };
+            let triangle = [index([a0, a1, a2, a3]), index([b0, b1, b2, b3]), index([c0, c1, c2, c3])];
+            // Negative numbers are left to those who complain of them.
+            if (triangle[0] | triangle[1] | triangle[2]) > i32::MAX as u32 {
+                break;
+            }
+            out.push(triangle);
         }
-        let row: &[u8; 13] = self.data.get(self.at..)?.first_chunk()?;
-        if row[0] != 3 {
-            return None;
+        let read = out.len() - before;
+        self.at += read * rows.stride;
+        read as u64
+    }
+
+    fn float_triples(&mut self, rows: Rows, out: &mut Vec<[f64; 3]>) -> bool {
+        let float = |bytes: [u8; 4]| f64::from(if BIG { f32::from_be_bytes(bytes) } else { f32::from_le_bytes(bytes) });
+        let size = usize::try_from(rows.count).ok().and_then(|count| count.checked_mul(rows.stride));
+        let Some(data) = size.and_then(|size| self.take(size)) else { return false };
+        for row in data.chunks_exact(rows.stride) {
+            if let Some(&[x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3]) = row[rows.offset..].first_chunk() {
+                out.push([float([x0, x1, x2, x3]), float([y0, y1, y2, y3]), float([z0, z1, z2, z3])]);
+            }
         }
-        let index = |at: usize| {
-            let bytes = [row[at], row[at + 1], row[at + 2], row[at + 3]];
-            if BIG { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) }
-        };
-        let corners = [index(1), index(5), index(9)];
-        // Negative numbers are left to the path that knows how to complain of them.
-        if corners.iter().any(|&c| c > i32::MAX as u32) {
-            return None;
-        }
-        self.at += row.len();
-        Some(corners)
+        true
     }
 }
 
@@ -233,6 +263,11 @@ fn read_vertices<S: Source>(source: &mut S, element: &Element<'_>, options: &Rea
     let mut normals = Vec::with_capacity(if has_normals { capacity } else { 0 });
     let mut uvs = Vec::with_capacity(if has_uvs { capacity } else { 0 });
     let mut colors = VertexColors::default();
+    if let Some(rows) = float_positions(element, &slots)
+        && source.float_triples(rows, &mut positions)
+    {
+        return Ok(Mesh::new(positions, Vec::new()));
+    }
     let mut row = [f64::NAN; SLOTS];
     for vertex in 0..element.count {
         for (property, slot) in element.properties.iter().zip(&slots) {
@@ -266,6 +301,38 @@ fn read_vertices<S: Source>(source: &mut S, element: &Element<'_>, options: &Rea
     mesh.normals = has_normals.then(|| Attribute::per_vertex(normals));
     mesh.uvs = if has_uvs { vec![Attribute::per_vertex(uvs)] } else { Vec::new() };
     Ok(mesh)
+}
+
+/// The rows of vertices of which only the position is wanted and is three `f32` in a row, as in most large files.
+fn float_positions(element: &Element<'_>, slots: &[Option<(usize, Scalar)>]) -> Option<Rows> {
+    let first = slots.iter().position(Option::is_some)?;
+    let position = [0, 1, 2].map(|slot| Some((slot, Scalar::F32)));
+    let others = slots.get(first + 3..)?;
+    let plain = slots[first..first + 3] == position && others.iter().all(Option::is_none);
+    let offset = fixed_size(&element.properties[..first])?;
+    let stride = fixed_size(&element.properties)?;
+    plain.then_some(Rows { count: element.count, stride, offset })
+}
+
+/// The rows of faces that are triangles with 32-bit indices, and of whose other properties none is wanted.
+fn plain_triangles(element: &Element<'_>, slots: &[FaceSlot]) -> Option<Rows> {
+    let list = slots.iter().position(|slot| !matches!(slot, FaceSlot::Other))?;
+    let FaceSlot::Vertices { count: Scalar::I8 | Scalar::U8, item: Scalar::I32 | Scalar::U32 } = slots[list] else {
+        return None;
+    };
+    let others = slots.get(list + 1..)?;
+    let plain = others.iter().all(|slot| matches!(slot, FaceSlot::Other));
+    let offset = fixed_size(&element.properties[..list])?;
+    let behind = fixed_size(&element.properties[list + 1..])?;
+    plain.then_some(Rows { count: element.count, stride: offset + 13 + behind, offset })
+}
+
+/// The bytes that properties take together in a binary file, if none is a list.
+fn fixed_size(properties: &[Property<'_>]) -> Option<usize> {
+    properties.iter().try_fold(0, |size, property| match property.kind {
+        Kind::Scalar(scalar) => Some(size + scalar.size()),
+        Kind::List { .. } => None,
+    })
 }
 
 /// Room for the rows of an element, as far as the file can hold them.
@@ -316,28 +383,36 @@ fn read_faces<S: Source>(
     data.faces.triangles.reserve(capacity(source, element));
     let (mut corners, mut uvs): (Vec<u32>, Vec<f64>) = (Vec::new(), Vec::new());
     let mut uv_indices = Vec::new();
-    for face in 0..element.count {
+    let plain = plain_triangles(element, &slots);
+    if plain.is_some() {
+        data.texture_runs.push((data.faces.triangles.len(), None));
+    }
+    let mut face = 0;
+    while face < element.count {
+        if let Some(rows) = plain {
+            let left = Rows { count: element.count - face, ..rows };
+            let read = source.triangles(left, &mut data.faces.triangles);
+            if read > 0 {
+                face += read;
+                continue;
+            }
+        }
         let mut texture = None;
         uvs.clear();
         for (property, slot) in element.properties.iter().zip(&slots) {
             let found = match *slot {
                 FaceSlot::Vertices { count, item } => {
                     corners.clear();
-                    if let Some(triangle) = source.triangle(count, item) {
-                        corners.extend(triangle);
-                        Some(())
-                    } else {
-                        let mut wrong = None;
-                        let found = list(source, count, item, |number| match vertex_index(number) {
-                            Some(index) => corners.push(index),
-                            None => wrong = Some(number),
-                        });
-                        if let Some(number) = wrong {
-                            let what = format!("{number} is not the number of a vertex");
-                            return Err(Problem::new(format!("face {face}"), what));
-                        }
-                        found
+                    let mut wrong = None;
+                    let found = list(source, count, item, |number| match vertex_index(number) {
+                        Some(index) => corners.push(index),
+                        None => wrong = Some(number),
+                    });
+                    if let Some(number) = wrong {
+                        let what = format!("{number} is not the number of a vertex");
+                        return Err(Problem::new(format!("face {face}"), what));
                     }
+                    found
                 }
                 FaceSlot::TextureCoordinates { count, item } => list(source, count, item, |number| uvs.push(number)),
                 FaceSlot::TextureNumber(scalar) => source.number(scalar).map(|number| texture = vertex_index(number)),
@@ -363,6 +438,7 @@ fn read_faces<S: Source>(
             data.uv_corners.resize(before, [Attribute::<[f32; 2]>::NONE; 3]);
             fan(&uv_indices, &mut data.uv_corners);
         }
+        face += 1;
     }
     data.uv_corners
         .resize(if data.uvs.is_empty() { 0 } else { data.faces.triangles.len() }, [Attribute::<[f32; 2]>::NONE; 3]);
