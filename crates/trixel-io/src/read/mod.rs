@@ -5,16 +5,23 @@
 //! merely claims.
 
 mod collada;
+mod color;
+mod directory;
 mod gltf;
+mod mtl;
 mod obj;
 mod off;
 mod ply;
+mod ply_header;
+mod polygon;
+mod sniff;
 mod stl;
+mod text;
 mod threemf;
 
 use std::path::{Path, PathBuf};
 
-use trixel::Mesh;
+use trixel::{Mesh, MeshError};
 
 /// A mesh file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -151,11 +158,107 @@ pub(crate) trait Resources {
     fn locate(&self, relative: &str) -> Option<PathBuf>;
 }
 
-/// Reads the mesh file at `path`.
+/// Reads the mesh file at `path`, with the files beside it that it names.
+///
+/// The extension picks the reader, in upper or lower case; without a known one the first bytes do.
 ///
 /// # Errors
 /// When the file cannot be read, is of no known format, is damaged, or holds no triangle.
+///
+/// ```
+/// use trixel_io::read::{ReadOptions, read_mesh};
+/// let path = std::env::temp_dir().join(format!("trixel-doc-{}.off", std::process::id()));
+/// std::fs::write(&path, "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")?;
+/// let loaded = read_mesh(&path, &ReadOptions::default())?;
+/// assert_eq!(loaded.mesh.triangles, [[0, 1, 2]]);
+/// assert!(loaded.warnings.is_empty());
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_mesh(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
-    let _ = options;
-    Err(ReadError::UnknownFormat { path: path.to_owned() })
+    let bytes = std::fs::read(path).map_err(|source| ReadError::Io { path: path.to_owned(), source })?;
+    let format = MeshFormat::from_path(path).or_else(|| sniff::format_of(&bytes));
+    match format {
+        Some(format) => read_bytes(format, path, &bytes, options, &directory::Directory::of(path)),
+        None if bytes.is_empty() => Err(damaged(path, empty_file())),
+        None => Err(ReadError::UnknownFormat { path: path.to_owned() }),
+    }
+}
+
+/// Reads a mesh from the bytes of a file of a known format, where there is no file system or none to be trusted.
+///
+/// Files that it refers to count as missing: buffers are an error, materials and textures a warning. Errors name the
+/// path `<bytes>.EXTENSION`.
+///
+/// # Errors
+/// When the bytes break the format's rules or hold no triangle.
+pub fn read_mesh_bytes(format: MeshFormat, bytes: &[u8], options: &ReadOptions) -> Result<Loaded, ReadError> {
+    let path = PathBuf::from(format!("<bytes>.{}", format.extension()));
+    read_bytes(format, &path, bytes, options, &directory::Nowhere)
+}
+
+/// Runs the reader of a format, and holds what it returns to what this module promises.
+fn read_bytes(
+    format: MeshFormat,
+    path: &Path,
+    bytes: &[u8],
+    options: &ReadOptions,
+    resources: &dyn Resources,
+) -> Result<Loaded, ReadError> {
+    if bytes.is_empty() {
+        return Err(damaged(path, empty_file()));
+    }
+    let read = match format {
+        MeshFormat::Obj => obj::read,
+        MeshFormat::Stl => stl::read,
+        MeshFormat::Ply => ply::read,
+        MeshFormat::Off => off::read,
+        MeshFormat::Gltf | MeshFormat::Glb => gltf::read,
+        MeshFormat::ThreeMf => threemf::read,
+        MeshFormat::Collada => collada::read,
+    };
+    let loaded = read(bytes, options, resources).map_err(|problem| damaged(path, problem))?;
+    if loaded.mesh.triangles.is_empty() {
+        return Err(ReadError::Empty { path: path.to_owned() });
+    }
+    check(&loaded.mesh).map_err(|error| damaged(path, problem_of(&error)))?;
+    Ok(loaded)
+}
+
+fn damaged(path: &Path, problem: Problem) -> ReadError {
+    ReadError::Damaged { path: path.to_owned(), problem }
+}
+
+fn empty_file() -> Problem {
+    Problem::new("start", "the file is empty (0 bytes)")
+}
+
+/// [`Mesh::check`], several times faster for meshes that pass.
+fn check(mesh: &Mesh) -> Result<(), MeshError> {
+    // In both passes without branches, so that they run at memory speed.
+    let highest = mesh.triangles.iter().flatten().fold(0, |highest, &vertex| highest.max(vertex));
+    let finite = |position: &[f64; 3]| position.iter().fold(true, |all, c| all & c.is_finite());
+    let all_finite =
+        mesh.positions.as_chunks::<256>().0.iter().all(|chunk| chunk.iter().fold(true, |all, p| all & finite(p)))
+            && mesh.positions.as_chunks::<256>().1.iter().all(finite);
+    // A vertex that no triangle uses may be anything: the full check decides.
+    if (highest as usize) < mesh.positions.len() && all_finite && u32::try_from(mesh.positions.len()).is_ok() {
+        return Ok(());
+    }
+    mesh.check()
+}
+
+/// A mesh error as a place and a problem.
+fn problem_of(error: &MeshError) -> Problem {
+    match error {
+        MeshError::IndexOutOfRange { triangle, vertex, vertices } => Problem::new(
+            format!("triangle {triangle}"),
+            format!("names vertex {vertex}, but the file has only {vertices} vertices, counted from 0; it is damaged"),
+        ),
+        MeshError::NotFinite { vertex, position: [x, y, z] } => Problem::new(
+            format!("vertex {vertex} (counted from 0)"),
+            format!("its position ({x}, {y}, {z}) is not finite; repair or remove it"),
+        ),
+        other => Problem::new("mesh", other.to_string()),
+    }
 }

@@ -1,8 +1,389 @@
-use trixel::Mesh;
+//! Wavefront OBJ: polygons, with vertex colours and the materials of MTL libraries.
+//!
+//! Own code because the usual crate reads coordinates as `f32`, splits vertices at seams, and takes several times as long.
 
+use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
+
+use memchr::memchr2;
+use trixel::{Attribute, Mesh};
+
+use super::color::{Scale, VertexColors};
+use super::mtl::{Materials, warn_of};
+use super::polygon::{Faces, fan};
+use super::text::{self, Scanner, line_at, narrow, shown};
 use super::{Loaded, Problem, ReadOptions, Resources};
 
+/// More material libraries than any real file has; each may be as large as it likes.
+const MOST_LIBRARIES: usize = 64;
+
+/// A corner without texture coordinates or normal.
+const NONE: u32 = Attribute::<[f32; 2]>::NONE;
+
 pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resources) -> Result<Loaded, Problem> {
-    let _ = (bytes, options, resources, Mesh::default());
-    Err(Problem::new("start", "not implemented"))
+    let bytes = text::without_byte_order_mark(bytes);
+    let mut reader = Reader { attributes: options.attributes, ..Reader::default() };
+    let mut at = 0;
+    while at < bytes.len() {
+        let (line, next) = logical_line(bytes, at);
+        reader.line(&line, at).map_err(|what| Problem::new(line_at(bytes, at), what))?;
+        at = next;
+    }
+    reader.finish(bytes, resources)
+}
+
+/// The line at `at`, joined with those that it continues on by a `\` at its end, and where the next starts.
+fn logical_line(bytes: &[u8], at: usize) -> (Cow<'_, [u8]>, usize) {
+    let (line, mut next) = physical_line(bytes, at);
+    let continued = |line: &[u8]| line.last() == Some(&b'\\');
+    // A comment may end with the path of a folder.
+    if !continued(line) || line.trim_ascii_start().starts_with(b"#") {
+        return (Cow::Borrowed(line), next);
+    }
+    let mut joined = line.to_vec();
+    while continued(&joined) && next < bytes.len() {
+        joined.pop();
+        joined.push(b' ');
+        let (line, after) = physical_line(bytes, next);
+        joined.extend_from_slice(line);
+        next = after;
+    }
+    (Cow::Owned(joined), next)
+}
+
+fn physical_line(bytes: &[u8], at: usize) -> (&[u8], usize) {
+    let rest = &bytes[at..];
+    match memchr2(b'\n', b'\r', rest) {
+        None => (rest, bytes.len()),
+        Some(length) => {
+            let end = if rest[length..].starts_with(b"\r\n") { 2 } else { 1 };
+            (&rest[..length], at + length + end)
+        }
+    }
+}
+
+/// Indices of a face's corners into one of the lists.
+#[derive(Default)]
+struct Corners {
+    /// Of the face being read.
+    face: Vec<u32>,
+    /// Of all triangles, from the first face that has any.
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Corners {
+    /// Adds the face that was read, whose triangles were the last of `triangles`.
+    fn push(&mut self, triangles: usize) {
+        if self.triangles.is_empty() && self.face.iter().all(|&corner| corner == NONE) {
+            return;
+        }
+        self.triangles.resize(triangles + 2 - self.face.len(), [NONE; 3]);
+        fan(&self.face, &mut self.triangles);
+    }
+
+    /// The attribute that the corners choose values of, and how many chose one that does not exist.
+    fn finish<T: Copy>(mut self, triangles: usize, values: Vec<T>) -> (Option<Attribute<T>>, usize) {
+        if self.triangles.is_empty() {
+            return (None, 0);
+        }
+        self.triangles.resize(triangles, [NONE; 3]);
+        let mut wrong = 0;
+        for corner in self.triangles.iter_mut().flatten() {
+            if *corner != NONE && *corner as usize >= values.len() {
+                *corner = NONE;
+                wrong += 1;
+            }
+        }
+        (Some(Attribute { values, corners: Some(self.triangles) }), wrong)
+    }
+}
+
+#[derive(Default)]
+struct Reader {
+    attributes: bool,
+    positions: Vec<[f64; 3]>,
+    colors: VertexColors,
+    texture_coordinates: Vec<[f32; 2]>,
+    normals: Vec<[f32; 3]>,
+    faces: Faces,
+    vertices: Vec<u32>,
+    texture_corners: Corners,
+    normal_corners: Corners,
+    /// The highest vertex that a face names, and where the line with it starts.
+    highest: (u32, usize),
+    /// First triangle of each run of faces with the same material, and its number in `used`.
+    material_runs: Vec<(usize, u32)>,
+    used: Vec<Vec<u8>>,
+    used_by_name: HashMap<Vec<u8>, u32>,
+    libraries: Vec<Vec<u8>>,
+    /// Vertices with a weight.
+    weighted: usize,
+    free_forms: usize,
+    /// Number and first place of lines that are not OBJ.
+    unknown: (usize, usize),
+}
+
+impl Reader {
+    /// Reads the line that starts at byte `at`; what is wrong with it otherwise.
+    fn line(&mut self, line: &[u8], at: usize) -> Result<(), String> {
+        let mut scanner = Scanner::with_comments(line);
+        let Some(keyword) = scanner.word() else { return Ok(()) };
+        match keyword {
+            b"v" => return self.vertex(&mut scanner),
+            b"f" | b"fo" => return self.face(&mut scanner, at),
+            b"vt" if self.attributes => {
+                let u = number(&mut scanner)?;
+                let v = scanner.float().unwrap_or(0.0);
+                self.texture_coordinates.push([u, 1.0 - v].map(narrow));
+            }
+            b"vn" if self.attributes => {
+                let normal = [number(&mut scanner)?, number(&mut scanner)?, number(&mut scanner)?];
+                self.normals.push(normal.map(narrow));
+            }
+            b"usemtl" if self.attributes => self.use_material(rest_of(line, &scanner)),
+            b"mtllib" if self.attributes => self.libraries.push(rest_of(line, &scanner).to_vec()),
+            b"curv" | b"curv2" | b"surf" => self.free_forms += 1,
+            b"vt" | b"vn" | b"usemtl" | b"mtllib" | b"g" | b"o" | b"s" | b"p" | b"l" | b"vp" | b"cstype" | b"deg"
+            | b"bmat" | b"step" | b"parm" | b"trim" | b"hole" | b"scrv" | b"sp" | b"end" | b"con" | b"mg"
+            | b"bevel" | b"c_interp" | b"d_interp" | b"lod" | b"shadow_obj" | b"trace_obj" | b"ctech" | b"stech"
+            | b"maplib" | b"usemap" => {}
+            _ => {
+                if self.unknown.0 == 0 {
+                    self.unknown.1 = at;
+                }
+                self.unknown.0 += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// `v x y z`, with a weight, a colour, or a colour and its alpha behind.
+    fn vertex(&mut self, scanner: &mut Scanner<'_>) -> Result<(), String> {
+        let mut position = [number(scanner)?, number(scanner)?, number(scanner)?];
+        let mut more = [f64::NAN; 4];
+        let found = more.iter_mut().map_while(|n| scanner.float().map(|f| *n = f)).count();
+        // The weight of a rational curve; a polygon's vertex with one is meant as homogeneous.
+        if found == 1 && more[0] != 1.0 {
+            position = position.map(|c| c / more[0]);
+            self.weighted += 1;
+        }
+        if found >= 3 && self.attributes {
+            self.colors.set(self.positions.len(), more);
+        }
+        self.positions.push(position);
+        Ok(())
+    }
+
+    fn face(&mut self, scanner: &mut Scanner<'_>, at: usize) -> Result<(), String> {
+        self.vertices.clear();
+        self.texture_corners.face.clear();
+        self.normal_corners.face.clear();
+        while scanner.skip_space().is_some() {
+            let mut corner = References { rest: scanner.rest() };
+            let parsed = corner.next(self.positions.len()).and_then(|vertex| {
+                if !self.attributes {
+                    return Some([vertex, NONE, NONE]);
+                }
+                let texture = corner.next_after_slash(self.texture_coordinates.len())?;
+                let normal = corner.next_after_slash(self.normals.len())?;
+                corner.rest.first().is_none_or(|&b| b <= b' ').then_some([vertex, texture, normal])
+            });
+            let word = scanner.word();
+            let Some([vertex, texture, normal]) = parsed else {
+                let word = shown(word.unwrap_or_default());
+                return Err(format!(
+                    "`{word}` is not a face corner: vertex, vertex/texture, vertex//normal or vertex/texture/normal, each \
+                     counted from 1, or from -1 backwards and not before the first"
+                ));
+            };
+            if vertex >= self.highest.0 {
+                self.highest = (vertex, at);
+            }
+            self.vertices.push(vertex);
+            if self.attributes {
+                self.texture_corners.face.push(texture);
+                self.normal_corners.face.push(normal);
+            }
+        }
+        if self.faces.push(&self.vertices) > 0 && self.attributes {
+            self.texture_corners.push(self.faces.triangles.len());
+            self.normal_corners.push(self.faces.triangles.len());
+        }
+        Ok(())
+    }
+
+    fn use_material(&mut self, name: &[u8]) {
+        let index = match self.used_by_name.get(name) {
+            Some(&index) => index,
+            None => {
+                let index = u32::try_from(self.used.len()).unwrap_or(Mesh::NO_MATERIAL);
+                self.used.push(name.to_vec());
+                self.used_by_name.insert(name.to_vec(), index);
+                index
+            }
+        };
+        self.material_runs.push((self.faces.triangles.len(), index));
+    }
+
+    fn finish(mut self, bytes: &[u8], resources: &dyn Resources) -> Result<Loaded, Problem> {
+        let vertices = self.positions.len();
+        if self.highest.0 as usize >= vertices && !self.faces.triangles.is_empty() {
+            let what =
+                format!("the face names vertex {}, but the file has only {vertices}", u64::from(self.highest.0) + 1);
+            return Err(Problem::new(line_at(bytes, self.highest.1), what));
+        }
+        let mut warnings = Vec::new();
+        self.warn_of_lines(bytes, &mut warnings);
+
+        let mut corners = [&mut self.texture_corners.triangles, &mut self.normal_corners.triangles];
+        let triangles = std::mem::take(&mut self.faces).finish(&self.positions, &mut corners, &mut warnings);
+        let count = triangles.len();
+        let mut mesh = Mesh::new(std::mem::take(&mut self.positions), triangles);
+        mesh.colors = std::mem::take(&mut self.colors).finish(vertices, Scale::Guess);
+        let (uvs, wrong_uvs) =
+            std::mem::take(&mut self.texture_corners).finish(count, std::mem::take(&mut self.texture_coordinates));
+        let (normals, wrong_normals) =
+            std::mem::take(&mut self.normal_corners).finish(count, std::mem::take(&mut self.normals));
+        mesh.uvs = uvs.into_iter().collect();
+        mesh.normals = normals;
+        for (wrong, kind) in [(wrong_uvs, "texture coordinates"), (wrong_normals, "normals")] {
+            if wrong > 0 {
+                warnings.push(format!("{wrong} face corners name {kind} that do not exist; they stay without"));
+            }
+        }
+        self.add_materials(&mut mesh, resources, &mut warnings);
+        Ok(Loaded { mesh, warnings })
+    }
+
+    fn warn_of_lines(&self, bytes: &[u8], warnings: &mut Vec<String>) {
+        if self.free_forms > 0 {
+            warnings.push(format!(
+                "skipped {} free-form curves and surfaces, which are not supported: export polygons instead",
+                self.free_forms
+            ));
+        }
+        if self.weighted > 0 {
+            warnings.push(format!("divided the coordinates of {} vertices by their weight", self.weighted));
+        }
+        if self.unknown.0 > 0 {
+            let (count, first) = self.unknown;
+            warnings.push(format!("skipped {count} lines that are not OBJ, the first at {}", line_at(bytes, first)));
+        }
+    }
+
+    fn add_materials(&self, mesh: &mut Mesh, resources: &dyn Resources, warnings: &mut Vec<String>) {
+        let mut materials = Materials::default();
+        let complete = self.load_libraries(&mut materials, resources, warnings);
+        let mut unknown = Vec::new();
+        let numbers: Vec<u32> = self
+            .used
+            .iter()
+            .map(|name| {
+                materials.find(name).unwrap_or_else(|| {
+                    unknown.push(shown(name));
+                    materials.add_default(name)
+                })
+            })
+            .collect();
+        // Otherwise a missing library explains it.
+        if complete {
+            warn_of(warnings, &unknown, "material", "in no material library; it gets the default");
+        }
+        if !self.material_runs.is_empty() {
+            let count = mesh.triangles.len();
+            let starts = self.material_runs.iter().skip(1).map(|run| run.0).chain([count]);
+            mesh.triangle_materials = vec![Mesh::NO_MATERIAL; self.material_runs[0].0];
+            mesh.triangle_materials.reserve_exact(count - self.material_runs[0].0);
+            for (&(_, used), end) in self.material_runs.iter().zip(starts) {
+                mesh.triangle_materials.resize(end, numbers[used as usize]);
+            }
+        }
+        materials.finish(mesh, warnings);
+    }
+
+    /// Loads each library once, and returns whether all are there. A line may name several, or one with spaces in its
+    /// name.
+    fn load_libraries(&self, materials: &mut Materials, resources: &dyn Resources, warnings: &mut Vec<String>) -> bool {
+        let (mut tried, mut missing, mut loaded) = (HashSet::new(), Vec::new(), 0);
+        for line in &self.libraries {
+            let mut load = |name: &[u8], missing: &mut Vec<String>| {
+                if !tried.insert(name.to_vec()) {
+                    return true;
+                }
+                if loaded >= MOST_LIBRARIES {
+                    missing.push(shown(name));
+                    return false;
+                }
+                match resources.load(&String::from_utf8_lossy(name)) {
+                    Ok(bytes) => {
+                        loaded += 1;
+                        materials.read(text::without_byte_order_mark(&bytes), resources);
+                        true
+                    }
+                    Err(_) => false,
+                }
+            };
+            if load(line, &mut missing) {
+                continue;
+            }
+            let mut names: Vec<&[u8]> = line.split(u8::is_ascii_whitespace).filter(|name| !name.is_empty()).collect();
+            // Already tried as the whole line.
+            names.retain(|name| *name != line.as_slice());
+            if names.is_empty() {
+                missing.push(shown(line));
+            }
+            for name in names {
+                if !load(name, &mut missing) {
+                    missing.push(shown(name));
+                }
+            }
+        }
+        warn_of(warnings, &missing, "material library", "not there; its materials get the default");
+        missing.is_empty()
+    }
+}
+
+/// Everything behind the keyword, where `#` is part of a name.
+fn rest_of<'a>(line: &'a [u8], scanner: &Scanner<'_>) -> &'a [u8] {
+    line.get(scanner.offset()..).unwrap_or_default().trim_ascii()
+}
+
+fn number(scanner: &mut Scanner<'_>) -> Result<f64, String> {
+    scanner.float().ok_or_else(|| match scanner.word() {
+        Some(word) => format!("expected a number, found `{}`", shown(word)),
+        None => "the line has too few numbers".into(),
+    })
+}
+
+/// The numbers of one corner of a face.
+struct References<'a> {
+    rest: &'a [u8],
+}
+
+impl References<'_> {
+    /// A number of an entry, counted from 1 or backwards from the last of `count`, as an index from 0.
+    fn next(&mut self, count: usize) -> Option<u32> {
+        let negative = self.rest.first() == Some(&b'-');
+        let digits = &self.rest[usize::from(negative)..];
+        let (mut number, mut length) = (0u64, 0);
+        while let Some(digit) = digits.get(length).map(|b| b.wrapping_sub(b'0')).filter(|&d| d < 10) {
+            // Far beyond any index, so that it cannot overflow, however long the digits go on.
+            number = (number * 10 + u64::from(digit)).min(1 << 40);
+            length += 1;
+        }
+        self.rest = &digits[length..];
+        let index = if negative { (count as u64).checked_sub(number)? } else { number.checked_sub(1)? };
+        // Minus nothing is no entry; neither is the mark of a missing one.
+        if negative && number == 0 {
+            return None;
+        }
+        u32::try_from(index).ok().filter(|&index| index != NONE)
+    }
+
+    /// The number behind a slash; [`NONE`] where there is no slash or nothing behind it.
+    fn next_after_slash(&mut self, count: usize) -> Option<u32> {
+        let Some(rest) = self.rest.strip_prefix(b"/") else { return Some(NONE) };
+        self.rest = rest;
+        if rest.first().is_none_or(|&b| b == b'/' || b <= b' ') { Some(NONE) } else { self.next(count) }
+    }
 }
