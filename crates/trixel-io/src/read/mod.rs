@@ -4,13 +4,18 @@
 //! finite, or one [`ReadError`]. It allocates in proportion to the bytes it was given, never to a count that the file
 //! merely claims.
 
+mod assemble;
 mod collada;
 mod gltf;
+mod instances;
 mod obj;
 mod off;
 mod ply;
 mod stl;
+#[cfg(test)]
+mod testing;
 mod threemf;
+mod transform;
 
 use std::path::{Path, PathBuf};
 
