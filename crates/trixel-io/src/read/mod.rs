@@ -4,11 +4,13 @@
 //! finite, or one [`ReadError`]. It allocates in proportion to the bytes it was given, never to a count that the file
 //! merely claims.
 
+mod assemble;
 mod collada;
 mod color;
 mod directory;
 mod gltf;
 mod mtl;
+mod instances;
 mod obj;
 mod off;
 mod ply;
@@ -17,7 +19,10 @@ mod polygon;
 mod sniff;
 mod stl;
 mod text;
+#[cfg(test)]
+mod testing;
 mod threemf;
+mod transform;
 
 use std::path::{Path, PathBuf};
 
