@@ -1,0 +1,32 @@
+//! The exposed faces as Wavefront OBJ: quadrilaterals with shared vertices, in mesh coordinates.
+//!
+//! Coordinates are printed so that reading them as `f64` gives them back to the last bit.
+
+use std::io::{BufWriter, Write};
+
+use trixel::Volume;
+
+use super::surface::{IndexedSurface, coordinates};
+use super::{Failure, WriteOptions};
+
+/// Writes the surface of `volume`; comments hold the grid.
+pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl Write) -> Result<(), Failure> {
+    let surface = IndexedSurface::new(volume, options)?;
+    let grid = volume.grid();
+    let ([nx, ny, nz], [ox, oy, oz], [hx, hy, hz]) = (grid.dims(), grid.origin(), grid.voxel_size());
+    // Small writes are cheaper into a buffer whose type is known here.
+    let mut out = BufWriter::new(out);
+    writeln!(out, "# exposed faces of voxels\n# dims {nx} {ny} {nz}\n# origin {ox:?} {oy:?} {oz:?}")?;
+    writeln!(out, "# voxel_size {hx:?} {hy:?} {hz:?}")?;
+    // A coordinate is one of a few: print each once.
+    let texts = coordinates(grid).map(|axis| axis.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>());
+    for [x, y, z] in &surface.vertices {
+        writeln!(out, "v {} {} {}", texts[0][*x as usize], texts[1][*y as usize], texts[2][*z as usize])?;
+    }
+    options.report(5, 6);
+    for quad in &surface.quads {
+        let [a, b, c, d] = quad.map(|index| u64::from(index) + 1);
+        writeln!(out, "f {a} {b} {c} {d}")?;
+    }
+    Ok(out.flush()?)
+}

@@ -1,0 +1,49 @@
+//! The exposed faces as binary little-endian PLY: quadrilaterals with shared vertices, in mesh coordinates (`double`).
+
+use std::io::{BufWriter, Write};
+
+use trixel::Volume;
+
+use super::surface::{IndexedSurface, coordinates};
+use super::{Failure, WriteOptions};
+
+/// Writes the surface of `volume`; comments hold the grid.
+pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl Write) -> Result<(), Failure> {
+    let surface = IndexedSurface::new(volume, options)?;
+    let grid = volume.grid();
+    let ([nx, ny, nz], [ox, oy, oz], [hx, hy, hz]) = (grid.dims(), grid.origin(), grid.voxel_size());
+    let mut out = BufWriter::new(out);
+    write!(
+        out,
+        "ply\n\
+         format binary_little_endian 1.0\n\
+         comment exposed faces of voxels\n\
+         comment dims {nx} {ny} {nz}\n\
+         comment origin {ox:?} {oy:?} {oz:?}\n\
+         comment voxel_size {hx:?} {hy:?} {hz:?}\n\
+         element vertex {}\n\
+         property double x\n\
+         property double y\n\
+         property double z\n\
+         element face {}\n\
+         property list uchar uint vertex_indices\n\
+         end_header\n",
+        surface.vertices.len(),
+        surface.quads.len(),
+    )?;
+    let coordinates = coordinates(grid);
+    for vertex in &surface.vertices {
+        for (axis, &at) in coordinates.iter().zip(vertex) {
+            out.write_all(&axis[at as usize].to_le_bytes())?;
+        }
+    }
+    options.report(5, 6);
+    for quad in &surface.quads {
+        let mut record = [4; 17];
+        for (bytes, index) in record[1..].chunks_mut(4).zip(quad) {
+            bytes.copy_from_slice(&index.to_le_bytes());
+        }
+        out.write_all(&record)?;
+    }
+    Ok(out.flush()?)
+}
