@@ -41,7 +41,8 @@ const SHAPES: [(&str, Shape); 7] = [
 ];
 
 fn torus([x, y, z]: [f64; 3]) -> f64 {
-    (x.hypot(y) - 0.68).hypot(z) - 0.28
+    let ring = (x * x + y * y).sqrt() - 0.68;
+    (ring * ring + z * z).sqrt() - 0.28
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -30,7 +30,7 @@ const GROUND_BOUNCE: Vec3 = Vec3::new(0.40, 0.37, 0.35);
 const FILL_DIRECTION: Vec3 = Vec3::new(0.85, -0.45, 0.30);
 const FILL_COLOR: Vec3 = Vec3::new(0.10, 0.12, 0.15);
 /// Sky rays a sample, and how far they look as a share of the object's longest side.
-const SKY_RAYS: u32 = 2;
+const SKY_RAYS: usize = 1;
 const SKY_REACH: f64 = 0.45;
 /// Voxels narrower than the first number of pixels are shaded by the smoothed normal, above the second by their faces.
 const SMOOTH_PIXELS: [f64; 2] = [2.0, 6.0];
@@ -88,9 +88,12 @@ pub(super) struct Scene<'a> {
     reach: f64,
     key: DVec3,
     albedo: Vec3,
-    samples: u32,
     voxel_edges: bool,
     kernel: Kernel,
+    /// Offsets of the samples within a pixel.
+    offsets: Vec<[f64; 2]>,
+    /// Points of the unit disk that light and sky rays go through.
+    disk: Vec<[f64; 2]>,
 }
 
 impl<'a> Scene<'a> {
@@ -123,9 +126,13 @@ impl<'a> Scene<'a> {
             reach: SKY_REACH * (high - low).max_element(),
             key: from_frame(frame, KEY_DIRECTION.normalize()),
             albedo: Vec3::from_array(options.color.map(linear_from_srgb)),
-            samples: options.samples_per_pixel,
             voxel_edges: options.voxel_edges,
             kernel: Kernel::new(),
+            offsets: match options.samples_per_pixel {
+                1 => vec![[0.5, 0.5]],
+                samples => (0..samples).map(sequence).collect(),
+            },
+            disk: (0..options.samples_per_pixel * TILE * TILE * SKY_RAYS as u32).map(|i| disk(sequence(i))).collect(),
             pyramid,
         }
     }
@@ -141,12 +148,12 @@ impl<'a> Scene<'a> {
     pub(super) fn shade_pixel(&self, x: u32, y: u32) -> Pixel {
         let mut pixel = Pixel::default();
         #[expect(clippy::cast_precision_loss, reason = "at most 64 samples")]
-        let share = 1.0 / self.samples as f32;
+        let share = 1.0 / self.offsets.len() as f32;
         let tile = TILE_ORDER[(y % TILE) as usize][(x % TILE) as usize];
-        for sample in 0..self.samples {
-            let [dx, dy] = if self.samples == 1 { [0.5, 0.5] } else { sequence(sample) };
+        for (sample, [dx, dy]) in self.offsets.iter().enumerate() {
             let (origin, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy);
-            let rays = Rays { first: (sample * TILE * TILE + tile) * SKY_RAYS };
+            let first = (sample * TILE_ORDER.as_flattened().len() + tile) * SKY_RAYS;
+            let rays = &self.disk[first..first + SKY_RAYS];
             if let Some(hit) = self.pyramid.march(origin / self.voxel, direction / self.voxel, f64::INFINITY) {
                 self.shade_object(&mut pixel, share, origin, direction, &hit, rays);
             } else if let Some(point) = self.ground_point(origin, direction) {
@@ -157,7 +164,7 @@ impl<'a> Scene<'a> {
         pixel
     }
 
-    fn shade_object(&self, pixel: &mut Pixel, share: f32, origin: DVec3, direction: DVec3, hit: &Hit, rays: Rays) {
+    fn shade_object(&self, pixel: &mut Pixel, share: f32, origin: DVec3, direction: DVec3, hit: &Hit, rays: &[[f64; 2]]) {
         let position = origin + hit.t * direction;
         let mut face = DVec3::ZERO;
         face[hit.axis] = -direction[hit.axis].signum();
@@ -226,7 +233,7 @@ impl<'a> Scene<'a> {
         (falling > 1e-9 && t > 0.0).then(|| origin + t * direction)
     }
 
-    fn ground_visibility(&self, point: DVec3, rays: Rays) -> (f32, f32) {
+    fn ground_visibility(&self, point: DVec3, rays: &[[f64; 2]]) -> (f32, f32) {
         // Start below the lowest voxels by a hair, so that they touch the ground rather than swallow it.
         let start = point - self.frame.up * (1e-4 * self.voxel.min_element());
         let nearest = start.clamp(self.low, self.high);
@@ -239,9 +246,8 @@ impl<'a> Scene<'a> {
     }
 
     /// The share of the key light that reaches `start`, by one ray.
-    fn key_visibility(&self, start: DVec3, rays: Rays) -> f32 {
-        let [u, v] = sequence(rays.first / SKY_RAYS);
-        let [x, y] = disk(u, v);
+    fn key_visibility(&self, start: DVec3, rays: &[[f64; 2]]) -> f32 {
+        let [x, y] = rays[0];
         let (tangent, bitangent) = self.key.any_orthonormal_pair();
         let direction = self.key + KEY_SPREAD * (x * tangent + y * bitangent);
         match self.pyramid.march(start / self.voxel, direction / self.voxel, f64::INFINITY) {
@@ -251,12 +257,10 @@ impl<'a> Scene<'a> {
     }
 
     /// The share of the sky that `start` sees, near things counting for more than far ones.
-    fn sky_visibility(&self, start: DVec3, normal: DVec3, rays: Rays) -> f32 {
+    fn sky_visibility(&self, start: DVec3, normal: DVec3, rays: &[[f64; 2]]) -> f32 {
         let (tangent, bitangent) = normal.any_orthonormal_pair();
         let mut visible = 0.0;
-        for ray in 0..SKY_RAYS {
-            let [u, v] = sequence(rays.first + ray);
-            let [x, y] = disk(u, v);
+        for [x, y] in rays {
             // Cosine-weighted: a point of the disk, lifted onto the hemisphere.
             let direction = x * tangent + y * bitangent + (1.0 - x * x - y * y).max(1e-3).sqrt() * normal;
             visible += match self.pyramid.march(start / self.voxel, direction / self.voxel, self.reach) {
@@ -265,19 +269,13 @@ impl<'a> Scene<'a> {
             };
         }
         #[expect(clippy::cast_possible_truncation, reason = "between 0 and 1")]
-        let share = (visible / f64::from(SKY_RAYS)) as f32;
+        let share = (visible / rays.len() as f64) as f32;
         share
     }
 }
 
-/// Which directions a sample's rays take.
-#[derive(Clone, Copy)]
-struct Rays {
-    first: u32,
-}
-
 /// The order in which the pixels of a tile take their directions; neighbours are far apart in it (a Bayer matrix).
-const TILE_ORDER: [[u32; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
+const TILE_ORDER: [[usize; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
 
 /// Point `index` of a sequence that fills the unit square evenly: multiples of the plastic number's powers (M. Roberts,
 /// *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018).
@@ -286,7 +284,7 @@ fn sequence(index: u32) -> [f64; 2] {
 }
 
 /// The unit square onto the unit disk, area kept.
-fn disk(u: f64, v: f64) -> [f64; 2] {
+fn disk([u, v]: [f64; 2]) -> [f64; 2] {
     let (sin, cos) = (std::f64::consts::TAU * v).sin_cos();
     [cos * u.sqrt(), sin * u.sqrt()]
 }
