@@ -101,19 +101,18 @@ pub(super) fn resolve(band: &Band<'_>, backdrop: &Backdrop, tolerance: f32, x: u
 }
 
 fn accumulate(sum: &mut Visibility, other: &Visibility, weight: f32) {
-    sum.coverage += weight * other.coverage;
+    sum.rays += weight * other.rays;
     sum.sky += weight * other.sky;
     sum.key += weight * other.key;
 }
 
 fn mean(sum: &Visibility) -> (f32, f32) {
-    if sum.coverage > 0.0 { (sum.sky / sum.coverage, sum.key / sum.coverage) } else { (1.0, 1.0) }
+    if sum.rays > 0.0 { (sum.sky / sum.rays, sum.key / sum.rays) } else { (1.0, 1.0) }
 }
 
 /// 1 where two pixels lie on one smooth surface, towards 0 where they do not.
 fn same_surface(a: &Pixel, b: &Pixel, tolerance: f32) -> f32 {
     let facing = a.normal.dot(b.normal).max(0.0);
     let apart = (b.position - a.position).dot(a.normal).abs() / tolerance;
-    // A pixel always counts itself, so the weights cannot sum to nothing.
     facing.powi(8) * (1.0 - apart).max(0.0)
 }

@@ -29,8 +29,9 @@ const GROUND_BOUNCE: Vec3 = Vec3::new(0.40, 0.37, 0.35);
 /// A second light from the right, too weak to need shadows.
 const FILL_DIRECTION: Vec3 = Vec3::new(0.85, -0.45, 0.30);
 const FILL_COLOR: Vec3 = Vec3::new(0.10, 0.12, 0.15);
-/// Sky rays a sample, and how far they look as a share of the object's longest side.
-const SKY_RAYS: usize = 1;
+/// One of so many samples sends a ray to the sky and one to the key light.
+const SAMPLES_PER_RAY: usize = 2;
+/// How far rays to the sky look, as a share of the object's longest side.
 const SKY_REACH: f64 = 0.45;
 /// Voxels narrower than the first number of pixels are shaded by the smoothed normal, above the second by their faces.
 const SMOOTH_PIXELS: [f64; 2] = [2.0, 6.0];
@@ -57,19 +58,21 @@ pub(super) struct Pixel {
 /// Sums over samples of one kind of surface.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Visibility {
-    /// Share of the pixel's samples.
+    /// Share of the pixel's samples that see this kind of surface.
     pub coverage: f32,
-    /// Sum of the visible share of the sky, times the samples' share.
+    /// How many of them sent rays to the sky and the key light.
+    pub rays: f32,
+    /// Sum of the visible share of the sky over these.
     pub sky: f32,
-    /// Sum of the visible share of the key light, times the samples' share.
+    /// Sum of the visible share of the key light over these.
     pub key: f32,
 }
 
 impl Visibility {
-    fn add(&mut self, share: f32, (sky, key): (f32, f32)) {
-        self.coverage += share;
-        self.sky += share * sky;
-        self.key += share * key;
+    fn add(&mut self, sky: f32, key: f32) {
+        self.rays += 1.0;
+        self.sky += sky;
+        self.key += key;
     }
 }
 
@@ -132,7 +135,7 @@ impl<'a> Scene<'a> {
                 1 => vec![[0.5, 0.5]],
                 samples => (0..samples).map(sequence).collect(),
             },
-            disk: (0..options.samples_per_pixel * TILE * TILE * SKY_RAYS as u32).map(|i| disk(sequence(i))).collect(),
+            disk: (0..options.samples_per_pixel * TILE * TILE).map(|i| disk(sequence(i))).collect(),
             pyramid,
         }
     }
@@ -152,19 +155,23 @@ impl<'a> Scene<'a> {
         let tile = TILE_ORDER[(y % TILE) as usize][(x % TILE) as usize];
         for (sample, [dx, dy]) in self.offsets.iter().enumerate() {
             let (origin, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy);
-            let first = (sample * TILE_ORDER.as_flattened().len() + tile) * SKY_RAYS;
-            let rays = &self.disk[first..first + SKY_RAYS];
+            // Neighbouring pixels take turns, so that any few of them have rays for any sample.
+            let turn = (sample + tile).is_multiple_of(SAMPLES_PER_RAY);
+            let ray = turn.then(|| self.disk[sample * TILE_ORDER.as_flattened().len() + tile]);
             if let Some(hit) = self.pyramid.march(origin / self.voxel, direction / self.voxel, f64::INFINITY) {
-                self.shade_object(&mut pixel, share, origin, direction, &hit, rays);
+                self.shade_object(&mut pixel, share, origin, direction, &hit, ray);
             } else if let Some(point) = self.ground_point(origin, direction) {
-                let visibility = self.ground_visibility(point, rays);
-                pixel.ground.add(share, visibility);
+                pixel.ground.coverage += share;
+                if let Some(ray) = ray {
+                    let (sky, key) = self.ground_visibility(point, ray);
+                    pixel.ground.add(sky, key);
+                }
             }
         }
         pixel
     }
 
-    fn shade_object(&self, pixel: &mut Pixel, share: f32, origin: DVec3, direction: DVec3, hit: &Hit, rays: &[[f64; 2]]) {
+    fn shade_object(&self, pixel: &mut Pixel, share: f32, origin: DVec3, direction: DVec3, hit: &Hit, ray: Option<[f64; 2]>) {
         let position = origin + hit.t * direction;
         let mut face = DVec3::ZERO;
         face[hit.axis] = -direction[hit.axis].signum();
@@ -182,10 +189,12 @@ impl<'a> Scene<'a> {
         // Rays start off the surface, and further along the smoothed normal so that its own steps cast no shadow.
         let start = position + face * lift + normal * self.voxel * smooth;
 
-        let sky = self.sky_visibility(start, normal, rays);
         let lit = normal.dot(self.key);
-        let key = if lit > 0.0 { self.key_visibility(start, rays) } else { 0.0 };
-        pixel.object.add(share, (sky, key));
+        pixel.object.coverage += share;
+        if let Some(ray) = ray {
+            let key = if lit > 0.0 { self.key_visibility(start, ray) } else { 0.0 };
+            pixel.object.add(self.sky_visibility(start, normal, ray), key);
+        }
 
         let edge = if self.voxel_edges { self.edge_shade(position, hit.axis, width) } else { 1.0 };
         let n = normal.as_vec3();
@@ -233,21 +242,20 @@ impl<'a> Scene<'a> {
         (falling > 1e-9 && t > 0.0).then(|| origin + t * direction)
     }
 
-    fn ground_visibility(&self, point: DVec3, rays: &[[f64; 2]]) -> (f32, f32) {
+    fn ground_visibility(&self, point: DVec3, ray: [f64; 2]) -> (f32, f32) {
         // Start below the lowest voxels by a hair, so that they touch the ground rather than swallow it.
         let start = point - self.frame.up * (1e-4 * self.voxel.min_element());
         let nearest = start.clamp(self.low, self.high);
         let sky = if start.distance_squared(nearest) < self.reach * self.reach {
-            self.sky_visibility(start, self.frame.up, rays)
+            self.sky_visibility(start, self.frame.up, ray)
         } else {
             1.0
         };
-        (sky, self.key_visibility(start, rays))
+        (sky, self.key_visibility(start, ray))
     }
 
     /// The share of the key light that reaches `start`, by one ray.
-    fn key_visibility(&self, start: DVec3, rays: &[[f64; 2]]) -> f32 {
-        let [x, y] = rays[0];
+    fn key_visibility(&self, start: DVec3, [x, y]: [f64; 2]) -> f32 {
         let (tangent, bitangent) = self.key.any_orthonormal_pair();
         let direction = self.key + KEY_SPREAD * (x * tangent + y * bitangent);
         match self.pyramid.march(start / self.voxel, direction / self.voxel, f64::INFINITY) {
@@ -256,21 +264,16 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// The share of the sky that `start` sees, near things counting for more than far ones.
-    fn sky_visibility(&self, start: DVec3, normal: DVec3, rays: &[[f64; 2]]) -> f32 {
+    /// The share of the sky that `start` sees, by one ray, near things counting for more than far ones.
+    fn sky_visibility(&self, start: DVec3, normal: DVec3, [x, y]: [f64; 2]) -> f32 {
         let (tangent, bitangent) = normal.any_orthonormal_pair();
-        let mut visible = 0.0;
-        for [x, y] in rays {
-            // Cosine-weighted: a point of the disk, lifted onto the hemisphere.
-            let direction = x * tangent + y * bitangent + (1.0 - x * x - y * y).max(1e-3).sqrt() * normal;
-            visible += match self.pyramid.march(start / self.voxel, direction / self.voxel, self.reach) {
-                Some(hit) => 0.75 * (hit.t / self.reach).sqrt(),
-                None => 1.0,
-            };
+        // Cosine-weighted: a point of the disk, lifted onto the hemisphere.
+        let direction = x * tangent + y * bitangent + (1.0 - x * x - y * y).max(1e-3).sqrt() * normal;
+        match self.pyramid.march(start / self.voxel, direction / self.voxel, self.reach) {
+            #[expect(clippy::cast_possible_truncation, reason = "between 0 and 1")]
+            Some(hit) => 0.75 * (hit.t / self.reach).sqrt() as f32,
+            None => 1.0,
         }
-        #[expect(clippy::cast_possible_truncation, reason = "between 0 and 1")]
-        let share = (visible / rays.len() as f64) as f32;
-        share
     }
 }
 
