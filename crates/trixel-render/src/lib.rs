@@ -1,1 +1,7 @@
 //! Pictures of voxel volumes.
+
+mod picture;
+mod preview;
+
+pub use picture::{Picture, PictureError};
+pub use preview::{Background, PreviewError, PreviewOptions, render_preview};
