@@ -1,1 +1,35 @@
-fn main() {}
+//! The `trixel` command.
+
+mod args;
+mod grid;
+mod info;
+mod memory;
+mod mesh;
+mod progress;
+mod report;
+mod verify;
+mod volume;
+mod voxelize;
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser};
+
+use args::{Cli, Command};
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let outcome = match cli.command {
+        Command::Voxelize(args) => voxelize::run(*args),
+        Command::Info(args) => info::run(&args),
+        Command::Verify(args) => verify::run(&args),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "trixel", &mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
+    };
+    outcome.unwrap_or_else(|error| {
+        progress::error(&error);
+        ExitCode::FAILURE
+    })
+}

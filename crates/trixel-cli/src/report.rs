@@ -1,0 +1,119 @@
+//! The JSON report: one object, with the fields that the documentation names.
+
+use serde::Serialize;
+use trixel::{Grid, Mesh, Topology};
+
+/// What `--report` writes.
+#[derive(Debug, Serialize)]
+pub(crate) struct Report {
+    pub(crate) command: Vec<String>,
+    pub(crate) version: &'static str,
+    pub(crate) mesh: MeshReport,
+    pub(crate) grid: GridReport,
+    pub(crate) mode: &'static str,
+    pub(crate) overlap: f64,
+    pub(crate) backend: &'static str,
+    pub(crate) strategy: &'static str,
+    pub(crate) threads: usize,
+    /// The GPU adapter; null on the CPU.
+    pub(crate) adapter: Option<serde_json::Value>,
+    /// How many voxels are set.
+    pub(crate) voxels: u64,
+    pub(crate) stages_ms: Stages,
+    pub(crate) samples_ms: Samples,
+    pub(crate) counters: Option<serde_json::Value>,
+    pub(crate) peak_memory_bytes: Option<u64>,
+    pub(crate) outputs: Vec<String>,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// The mesh in a report and in `info --json`.
+#[derive(Debug, Serialize)]
+pub(crate) struct MeshReport {
+    pub(crate) triangles: usize,
+    pub(crate) vertices: usize,
+    pub(crate) merged_vertices: usize,
+    pub(crate) edges: usize,
+    pub(crate) open_edges: usize,
+    pub(crate) non_manifold_edges: usize,
+    pub(crate) degenerate_triangles: usize,
+    pub(crate) components: usize,
+    pub(crate) closed: bool,
+    pub(crate) bounds: Option<[[f64; 3]; 2]>,
+}
+
+impl MeshReport {
+    pub(crate) fn new(mesh: &Mesh, topology: &Topology) -> Self {
+        Self {
+            triangles: mesh.triangles.len(),
+            vertices: mesh.positions.len(),
+            merged_vertices: topology.vertices,
+            edges: topology.edges,
+            open_edges: topology.open_edges,
+            non_manifold_edges: topology.non_manifold_edges,
+            degenerate_triangles: topology.degenerate_triangles,
+            components: topology.components,
+            closed: topology.is_closed(),
+            bounds: mesh.bounds().map(|bounds| [bounds.min, bounds.max]),
+        }
+    }
+}
+
+/// A grid, as every report and sidecar names it.
+#[derive(Debug, Serialize)]
+pub(crate) struct GridReport {
+    pub(crate) origin: [f64; 3],
+    pub(crate) voxel_size: [f64; 3],
+    pub(crate) dims: [u32; 3],
+}
+
+impl From<&Grid> for GridReport {
+    fn from(grid: &Grid) -> Self {
+        Self { origin: grid.origin(), voxel_size: grid.voxel_size(), dims: grid.dims() }
+    }
+}
+
+/// Milliseconds per stage; medians where a stage ran several times.
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct Stages {
+    pub(crate) read: f64,
+    /// Counting open and non-manifold edges: in mode solid and for reports.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) topology: Option<f64>,
+    pub(crate) snap: f64,
+    pub(crate) allocate: f64,
+    pub(crate) voxelize: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) write: Option<f64>,
+    pub(crate) total: f64,
+}
+
+/// Milliseconds of each run of the stages that `--repeat` repeats.
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct Samples {
+    pub(crate) voxelize: Vec<f64>,
+}
+
+/// The median; the mean of the middle two for an even number. 0 for none.
+pub(crate) fn median(samples: &[f64]) -> f64 {
+    let mut sorted = samples.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    match sorted.len() {
+        0 => 0.0,
+        n if n % 2 == 1 => sorted[middle],
+        _ => f64::midpoint(sorted[middle - 1], sorted[middle]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::median;
+
+    #[test]
+    fn medians() {
+        assert_eq!(median(&[]), 0.0);
+        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
+    }
+}

@@ -1,0 +1,64 @@
+//! Volumes by name, and outputs by extension.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use trixel::{Grid, UpAxis, Volume};
+use trixel_io::atomic_file::{AtomicFile, Staged};
+use trixel_io::write::{WriteOptions, check_target, write_volume};
+use trixel_render::{PreviewOptions, render_preview};
+
+fn is_picture(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
+}
+
+/// Finds out before the work whether the output could be written after it.
+pub(crate) fn check_output(path: &Path, grid: &Grid) -> Result<()> {
+    if is_picture(path) {
+        // Dropped at once, which removes it.
+        AtomicFile::create(path).map(drop).with_context(|| cannot_write(path))
+    } else {
+        Ok(check_target(path, grid)?)
+    }
+}
+
+/// Writes one output beside its target.
+pub(crate) fn stage_output(path: &Path, volume: &Volume, options: &WriteOptions<'_>) -> Result<Staged> {
+    if is_picture(path) { stage_picture(path, volume, options.up) } else { Ok(write_volume(path, volume, options)?) }
+}
+
+fn stage_picture(path: &Path, volume: &Volume, up: UpAxis) -> Result<Staged> {
+    let picture = render_preview(volume, &PreviewOptions { up, ..PreviewOptions::default() })?;
+    let mut file = AtomicFile::create(path).with_context(|| cannot_write(path))?;
+    picture.encode_png(&mut file).with_context(|| cannot_write(path))?;
+    file.stage().with_context(|| cannot_write(path))
+}
+
+fn cannot_write(path: &Path) -> String {
+    format!("cannot write {}", path.display())
+}
+
+/// The bounding box of the set voxels, as first and last index along each axis; `None` when none is set.
+pub(crate) fn occupied(volume: &Volume) -> Option<[[u32; 3]; 2]> {
+    let mut occupied: Option<[[u32; 3]; 2]> = None;
+    let [nx, ny, _] = volume.grid().dims();
+    for x in 0..nx {
+        for y in 0..ny {
+            let column = volume.column(x, y);
+            let (Some(low), Some(high)) = (lowest(column), highest(column)) else { continue };
+            let [from, to] = occupied.get_or_insert([[x, y, low], [x, y, high]]);
+            *from = [from[0].min(x), from[1].min(y), from[2].min(low)];
+            *to = [to[0].max(x), to[1].max(y), to[2].max(high)];
+        }
+    }
+    occupied
+}
+
+fn lowest(column: &[u64]) -> Option<u32> {
+    (0u32..).zip(column).find(|&(_, &word)| word != 0).map(|(i, word)| i * 64 + word.trailing_zeros())
+}
+
+fn highest(column: &[u64]) -> Option<u32> {
+    let words = (0u32..).zip(column).filter(|&(_, &word)| word != 0);
+    words.last().map(|(i, word)| i * 64 + 63 - word.leading_zeros())
+}

@@ -1,0 +1,220 @@
+//! `trixel voxelize`: read, snap, voxelize, write.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use trixel::lattice::LatticeMesh;
+use trixel::{Backend, Bytes, CpuBackend, Job, Mode, Topology, Volume};
+use trixel_io::atomic_file::{AtomicFile, Staged};
+use trixel_io::write::WriteOptions;
+
+use crate::args::{BackendArg, MethodArgs, VoxelizeArgs};
+use crate::grid::{GridRequest, usage};
+use crate::progress::Reporter;
+use crate::report::{GridReport, MeshReport, Report, Samples, Stages, median};
+use crate::{memory, mesh, volume};
+
+/// Left free beside a dense grid, for the mesh, the writers and everybody else.
+const RESERVE_BYTES: u64 = 256 << 20;
+
+pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
+    let start = Instant::now();
+    let request = GridRequest::from_args(&args.grid, &mut args.input);
+    let Some(input) = args.input else { usage("INPUT is missing: a mesh file, or scene:NAME") };
+    if args.outputs.is_empty() && args.report.is_none() {
+        usage("nothing to write: give -o OUT (for example -o voxels.npz) or --report FILE.json");
+    }
+    check_paths(&input, &args.outputs, args.report.as_deref())?;
+    set_threads(&args.method)?;
+    let reporter = Reporter::new(args.quiet);
+    let mut stages = Stages::default();
+
+    let (loaded, read_ms) = reporter.stage(&format!("reading {input}"), || mesh::load(&input, false, &reporter));
+    let loaded = loaded?;
+    stages.read = read_ms;
+    let up = args.up.axis().unwrap_or_else(|| mesh::up(&input, &loaded));
+
+    let job = job(&args.method, request.resolve(&loaded, &reporter)?)?;
+    for output in &args.outputs {
+        volume::check_output(output, job.grid())?;
+    }
+
+    let topology = (job.mode() == Mode::Solid || args.report.is_some()).then(|| {
+        let (topology, ms) = reporter.stage("counting edges", || Topology::of(&loaded));
+        stages.topology = Some(ms);
+        topology
+    });
+    if job.mode() == Mode::Solid {
+        warn_if_open(topology.as_ref(), &reporter);
+    }
+
+    let (lattice, snap_ms) = reporter.stage("snapping to the lattice", || LatticeMesh::snap(&loaded, job.grid()));
+    let lattice = lattice.with_context_of(&input)?;
+    stages.snap = snap_ms;
+
+    let (voxels, allocate_ms) = reporter.stage("allocating", || allocate(&job));
+    let mut voxels = voxels?;
+    stages.allocate = allocate_ms;
+
+    let backend = backend(args.method.backend);
+    let mut samples = Samples::default();
+    let mut strategy = job.strategy();
+    for _ in 0..args.repeat.get() {
+        let (used, ms) = reporter.stage("voxelizing", || backend.voxelize(&lattice, &job, &mut voxels));
+        strategy = used?;
+        samples.voxelize.push(ms);
+    }
+    stages.voxelize = median(&samples.voxelize);
+    drop(lattice);
+    let mesh_report = topology.map(|topology| MeshReport::new(&loaded, &topology));
+    let triangles = loaded.triangles.len();
+    drop(loaded);
+
+    let count = voxels.count();
+    if count == 0 {
+        reporter.warn(empty_hint(job.mode()));
+    }
+    let mut staged = Staged::default();
+    if !args.outputs.is_empty() {
+        let (written, ms) = reporter.stage("writing", || -> Result<()> {
+            for output in &args.outputs {
+                let options = WriteOptions { up, sparse: args.sparse, progress: Some(&|f| reporter.fraction(f)) };
+                staged = std::mem::take(&mut staged).join(volume::stage_output(output, &voxels, &options)?);
+            }
+            Ok(())
+        });
+        written?;
+        stages.write = Some(ms);
+    }
+    stages.total = start.elapsed().as_secs_f64() * 1e3;
+
+    let total = stages.total;
+    let voxelize_ms = stages.voxelize;
+    if let (Some(path), Some(mesh)) = (&args.report, mesh_report) {
+        let report = Report {
+            command: std::env::args().collect(),
+            version: env!("CARGO_PKG_VERSION"),
+            mesh,
+            grid: GridReport::from(job.grid()),
+            mode: job.mode().name(),
+            overlap: args.method.overlap,
+            backend: backend.name(),
+            strategy: strategy.name(),
+            threads: backend.threads(),
+            adapter: None,
+            voxels: count,
+            stages_ms: stages,
+            samples_ms: samples,
+            counters: None,
+            peak_memory_bytes: memory::peak(),
+            outputs: args.outputs.iter().map(|path| path.display().to_string()).collect(),
+            warnings: reporter.warnings(),
+        };
+        staged = staged.join(stage_report(path, &report)?);
+    }
+    staged.commit()?;
+
+    reporter.finish();
+    let [nx, ny, nz] = job.grid().dims();
+    reporter.say(&format!(
+        "{count} of {nx} x {ny} x {nz} voxels set ({}, {triangles} triangles); voxelized in {voxelize_ms:.1} ms, \
+         {total:.0} ms in all",
+        job.mode(),
+    ));
+    for output in args.outputs.iter().chain(&args.report) {
+        reporter.say(&format!("wrote {}", output.display()));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Names the input in errors about its vertices.
+trait ContextOf<T> {
+    fn with_context_of(self, input: &str) -> Result<T>;
+}
+
+impl<T, E: std::error::Error + Send + Sync + 'static> ContextOf<T> for std::result::Result<T, E> {
+    fn with_context_of(self, input: &str) -> Result<T> {
+        self.map_err(|error| anyhow::anyhow!("{input}: {error}"))
+    }
+}
+
+/// Refuses to write two outputs to one file, or over the input.
+fn check_paths(input: &str, outputs: &[PathBuf], report: Option<&Path>) -> Result<()> {
+    let mut seen = BTreeSet::new();
+    for path in outputs.iter().map(PathBuf::as_path).chain(report) {
+        if !seen.insert(path) {
+            usage(&format!("{} is given twice as an output", path.display()));
+        }
+        let same_file = match (path.canonicalize(), Path::new(input).canonicalize()) {
+            (Ok(output), Ok(input)) => output == input,
+            _ => false,
+        };
+        if same_file {
+            bail!("{} is the input; choose another output", path.display());
+        }
+    }
+    Ok(())
+}
+
+/// Gives rayon the number of threads that was asked for.
+pub(crate) fn set_threads(method: &MethodArgs) -> Result<()> {
+    if let Some(threads) = method.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
+        pool.build_global().with_context(|| format!("cannot start {threads} threads; ask for fewer"))?;
+    }
+    Ok(())
+}
+
+/// The job that the arguments describe.
+pub(crate) fn job(method: &MethodArgs, grid: trixel::Grid) -> Result<Job> {
+    let job = Job::new(grid, method.mode.into()).with_strategy(method.strategy.into());
+    Ok(job.with_overlap(method.overlap)?)
+}
+
+/// The backend that the arguments ask for.
+pub(crate) fn backend(backend: BackendArg) -> CpuBackend {
+    match backend {
+        BackendArg::Auto | BackendArg::Cpu => CpuBackend::default(),
+    }
+}
+
+/// An empty volume, if there is memory for it.
+pub(crate) fn allocate(job: &Job) -> Result<Volume> {
+    let available = memory::available().map(|bytes| bytes.saturating_sub(RESERVE_BYTES));
+    Ok(Volume::with_memory_limit(*job.grid(), available)?)
+}
+
+/// Tells that a solid of an open mesh is not what its user may think.
+pub(crate) fn warn_if_open(topology: Option<&Topology>, reporter: &Reporter) {
+    if let Some(topology) = topology.filter(|topology| !topology.is_closed()) {
+        reporter.warn(format!(
+            "the mesh is not closed: {} open and {} non-manifold edges; inside is still decided by counting crossings \
+             towards -z, so columns may leak through holes",
+            topology.open_edges, topology.non_manifold_edges
+        ));
+    }
+}
+
+fn empty_hint(mode: Mode) -> String {
+    match mode {
+        Mode::Solid => "no voxel is set: no voxel's centre is inside the mesh, or the mesh lies outside the grid",
+        Mode::Sliced => "no voxel is set: no line through voxel centres along z meets the mesh inside the grid",
+        Mode::Conservative | Mode::Thin => "no voxel is set: the mesh lies outside the grid",
+    }
+    .to_owned()
+}
+
+fn stage_report(path: &Path, report: &Report) -> Result<Staged> {
+    let cannot = || format!("cannot write {}", path.display());
+    let mut file = AtomicFile::create(path).with_context(cannot)?;
+    serde_json::to_writer_pretty(&mut file, report).with_context(cannot)?;
+    file.stage().with_context(cannot)
+}
+
+/// Bytes of a volume, for messages.
+pub(crate) fn volume_bytes(grid: &trixel::Grid) -> Bytes {
+    Bytes(Volume::required_bytes(grid))
+}
