@@ -5,6 +5,7 @@ pub mod lattice;
 mod material;
 mod mesh;
 mod mode;
+pub mod scene;
 mod volume;
 
 pub use grid::{Grid, GridError};
