@@ -116,7 +116,11 @@ fn attributes(mesh: &Mesh) -> Vec<String> {
         names.push("colors".to_owned());
     }
     if !mesh.uvs.is_empty() {
-        names.push(format!("texture coordinates ({} set{})", mesh.uvs.len(), if mesh.uvs.len() == 1 { "" } else { "s" }));
+        names.push(format!(
+            "texture coordinates ({} set{})",
+            mesh.uvs.len(),
+            if mesh.uvs.len() == 1 { "" } else { "s" }
+        ));
     }
     names
 }
@@ -129,7 +133,10 @@ impl MeshInfo {
         let mut lines = vec![
             format!("{}: mesh, {closed}", self.file),
             format!("  triangles            {}", mesh.triangles),
-            format!("  vertices             {} ({} after merging equal positions)", mesh.vertices, mesh.merged_vertices),
+            format!(
+                "  vertices             {} ({} after merging equal positions)",
+                mesh.vertices, mesh.merged_vertices
+            ),
             format!("  components           {}", mesh.components),
             format!("  open edges           {}", mesh.open_edges),
             format!("  non-manifold edges   {}", mesh.non_manifold_edges),
@@ -139,7 +146,8 @@ impl MeshInfo {
             lines.push(format!("  box                  {min:?} to {max:?}"));
         }
         lines.push(format!("  attributes           {}", list(&self.attributes)));
-        let names: Vec<_> = self.materials.iter().map(|name| if name.is_empty() { "(unnamed)" } else { name }).collect();
+        let names: Vec<_> =
+            self.materials.iter().map(|name| if name.is_empty() { "(unnamed)" } else { name }).collect();
         if !names.is_empty() {
             lines.push(format!("  materials            {}: {}", names.len(), shorten(&names)));
         }

@@ -10,6 +10,7 @@ pub mod lattice;
 mod material;
 mod mesh;
 mod mode;
+pub mod scene;
 mod topology;
 mod volume;
 

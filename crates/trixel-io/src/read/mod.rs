@@ -9,8 +9,8 @@ mod collada;
 mod color;
 mod directory;
 mod gltf;
-mod mtl;
 mod instances;
+mod mtl;
 mod obj;
 mod off;
 mod ply;
@@ -18,9 +18,9 @@ mod ply_header;
 mod polygon;
 mod sniff;
 mod stl;
-mod text;
 #[cfg(test)]
 mod testing;
+mod text;
 mod threemf;
 mod transform;
 

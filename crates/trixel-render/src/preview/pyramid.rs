@@ -159,9 +159,8 @@ impl<'a> Pyramid<'a> {
         let forward = d.map(|c| c > 0.0);
         let step = forward.map(|f| if f { 1 } else { -1 });
         // Where the ray leaves the slab of cells with this coordinate, along one axis.
-        let exit = |i: usize, cell: i32, shift: u32| {
-            (f64::from((cell + i32::from(forward[i])) << shift) - o[i]) * inverse[i]
-        };
+        let exit =
+            |i: usize, cell: i32, shift: u32| (f64::from((cell + i32::from(forward[i])) << shift) - o[i]) * inverse[i];
 
         // From here on `cell` counts cells of `level`, and `exits` are its far sides.
         let mut level = self.top;
@@ -407,6 +406,9 @@ mod tests {
         assert_eq!(pyramid.occupied_box(), ([3, 2, 65], [61, 31, 191]));
         let mut cells = Vec::new();
         pyramid.visit_cells(1, |lo, hi| cells.push((lo, hi)));
-        assert!(cells.iter().any(|(lo, _)| lo[0] == 3) && cells.iter().any(|(_, hi)| *hi == [61, 31, 191]), "{cells:?}");
+        assert!(
+            cells.iter().any(|(lo, _)| lo[0] == 3) && cells.iter().any(|(_, hi)| *hi == [61, 31, 191]),
+            "{cells:?}"
+        );
     }
 }

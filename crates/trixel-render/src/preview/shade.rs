@@ -171,7 +171,15 @@ impl<'a> Scene<'a> {
         pixel
     }
 
-    fn shade_object(&self, pixel: &mut Pixel, share: f32, origin: DVec3, direction: DVec3, hit: &Hit, ray: Option<[f64; 2]>) {
+    fn shade_object(
+        &self,
+        pixel: &mut Pixel,
+        share: f32,
+        origin: DVec3,
+        direction: DVec3,
+        hit: &Hit,
+        ray: Option<[f64; 2]>,
+    ) {
         let position = origin + hit.t * direction;
         let mut face = DVec3::ZERO;
         face[hit.axis] = -direction[hit.axis].signum();
@@ -229,7 +237,8 @@ impl<'a> Scene<'a> {
         // `rim` is in pixels from here on.
         let line = (0.018 * width).clamp(0.7, 2.5);
         let bevel = (0.07 * width).clamp(1.0, 12.0);
-        let dark = 0.26 * (1.0 - smoothstep([line * 0.5, line * 1.5], rim)) + 0.10 * (1.0 - smoothstep([0.0, bevel], rim));
+        let dark =
+            0.26 * (1.0 - smoothstep([line * 0.5, line * 1.5], rim)) + 0.10 * (1.0 - smoothstep([0.0, bevel], rim));
         #[expect(clippy::cast_possible_truncation, reason = "between 0 and 1")]
         let shade = (1.0 - strength * dark) as f32;
         shade
