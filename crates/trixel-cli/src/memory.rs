@@ -2,10 +2,7 @@
 
 /// Bytes that can still be had without swapping: the machine's, or the container's if that is less.
 pub(crate) fn available() -> Option<u64> {
-    if !sysinfo::IS_SUPPORTED_SYSTEM {
-        return None;
-    }
-    let mut system = sysinfo::System::new();
+    let mut system = sysinfo::System::new().ok()?;
     system.refresh_memory();
     let machine = system.available_memory();
     let container = system.cgroup_limits().map_or(u64::MAX, |limits| limits.free_memory);
