@@ -9,10 +9,10 @@ use memchr::memchr2;
 use trixel::{Attribute, Mesh};
 
 use super::color::{Scale, VertexColors};
-use super::mtl::{Materials, warn_of};
+use super::mtl::Materials;
 use super::polygon::{Faces, fan};
 use super::text::{self, Scanner, line_at, narrow, shown};
-use super::{Loaded, Problem, ReadOptions, Resources};
+use super::{Loaded, Problem, ReadOptions, Resources, warn_of};
 
 /// More material libraries than any real file has; each may be as large as it likes.
 const MOST_LIBRARIES: usize = 64;
@@ -281,7 +281,7 @@ impl Reader {
             .map(|name| {
                 materials.find(name).unwrap_or_else(|| {
                     unknown.push(shown(name));
-                    materials.add_default(name)
+                    materials.add(name)
                 })
             })
             .collect();
