@@ -8,7 +8,7 @@ use super::text::{Scanner, narrow, shown};
 use super::{Resources, warn_of};
 
 /// More materials than any real file has; a material is many times larger than its line in a file.
-const MOST_MATERIALS: usize = 65_536;
+pub(super) const MOST_MATERIALS: usize = 65_536;
 
 /// What libraries fill: the materials of a mesh, found by name.
 #[derive(Default)]
