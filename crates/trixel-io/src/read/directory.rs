@@ -1,6 +1,8 @@
 //! Files beside a mesh, found by the relative path that the mesh file writes.
 
-use std::ffi::OsStr;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::ffi::{OsStr, OsString};
 use std::io::{Error, ErrorKind, Result};
 use std::path::{Component, Path, PathBuf};
 
@@ -9,12 +11,14 @@ use super::Resources;
 /// The folder that a mesh file lies in.
 pub(super) struct Directory {
     folder: PathBuf,
+    /// The names in the folders looked into, by folder and lower case: a file may name thousands that are not there.
+    listings: RefCell<HashMap<PathBuf, HashMap<OsString, OsString>>>,
 }
 
 impl Directory {
     /// The folder of the mesh file at `path`.
     pub(super) fn of(path: &Path) -> Self {
-        Self { folder: path.parent().map(Path::to_owned).unwrap_or_default() }
+        Self { folder: path.parent().map(Path::to_owned).unwrap_or_default(), listings: RefCell::default() }
     }
 
     /// The file that `relative` names, which may be in a folder beside or above, as exporters write `../textures/a.png`.
@@ -22,7 +26,7 @@ impl Directory {
         let mut path = self.folder.clone();
         for component in Path::new(&checked(relative)?).components() {
             match component {
-                Component::Normal(name) => path = entry(&path, name),
+                Component::Normal(name) => path = self.entry(&path, name),
                 Component::ParentDir => path.push(".."),
                 _ => {}
             }
@@ -30,6 +34,18 @@ impl Directory {
         let kind = std::fs::metadata(&path)?;
         // Devices and pipes may never end.
         if kind.is_file() { Ok(path) } else { Err(Error::new(ErrorKind::InvalidInput, "not a regular file")) }
+    }
+
+    /// `folder/name`, or the entry of `folder` that differs from it only in case: many files were written where case
+    /// does not matter. Of several, the first in byte order.
+    fn entry(&self, folder: &Path, name: &OsStr) -> PathBuf {
+        let exact = folder.join(name);
+        if exact.exists() {
+            return exact;
+        }
+        let mut listings = self.listings.borrow_mut();
+        let listing = listings.entry(folder.to_owned()).or_insert_with(|| list(folder));
+        listing.get(&name.to_ascii_lowercase()).map_or(exact, |found| folder.join(found))
     }
 }
 
@@ -56,6 +72,16 @@ impl Resources for Nowhere {
     }
 }
 
+/// The names in a folder by their lower case; none if it cannot be read.
+fn list(folder: &Path) -> HashMap<OsString, OsString> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<OsString> = entries.map(|entry| entry.file_name()).collect();
+    // The first in byte order comes last, and so replaces the others.
+    names.sort_unstable_by(|a, b| b.cmp(a));
+    names.into_iter().map(|name| (name.to_ascii_lowercase(), name)).collect()
+}
+
 /// The relative path with `/` between its parts, or why a mesh may not refer to it.
 fn checked(relative: &str) -> Result<String> {
     let refused = |why| Err(Error::new(ErrorKind::InvalidInput, why));
@@ -72,19 +98,6 @@ fn checked(relative: &str) -> Result<String> {
     }
 }
 
-/// `folder/name`, or the entry of `folder` that differs from it only in case: many files were written where case does
-/// not matter. Of several, the first in byte order.
-fn entry(folder: &Path, name: &OsStr) -> PathBuf {
-    let exact = folder.join(name);
-    if exact.exists() {
-        return exact;
-    }
-    let folder_or_here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let Ok(entries) = std::fs::read_dir(folder_or_here) else { return exact };
-    let same = entries.flatten().map(|e| e.file_name()).filter(|n| n.eq_ignore_ascii_case(name)).min();
-    same.map_or(exact, |found| folder.join(found))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -94,7 +107,7 @@ mod tests {
         let folder = std::env::temp_dir().join(format!("trixel-directory-{test}-{}", std::process::id()));
         std::fs::create_dir_all(folder.join("sub")).unwrap();
         std::fs::write(folder.join("sub/Wood.PNG"), b"wood").unwrap();
-        Directory { folder }
+        Directory::of(&folder.join("mesh.obj"))
     }
 
     #[test]

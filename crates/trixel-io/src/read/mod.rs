@@ -230,6 +230,17 @@ fn read_bytes(
     Ok(loaded)
 }
 
+/// Warns of things by name, of many only of the first few.
+pub(crate) fn warn_of(warnings: &mut Vec<String>, names: &[String], kind: &str, what: &str) {
+    const NAMED: usize = 5;
+    for name in names.iter().take(NAMED) {
+        warnings.push(format!("the {kind} `{name}` is {what}"));
+    }
+    if names.len() > NAMED {
+        warnings.push(format!("{} more warnings like the last, each about another {kind}", names.len() - NAMED));
+    }
+}
+
 fn damaged(path: &Path, problem: Problem) -> ReadError {
     ReadError::Damaged { path: path.to_owned(), problem }
 }

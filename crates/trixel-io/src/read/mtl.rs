@@ -4,8 +4,11 @@ use std::collections::HashMap;
 
 use trixel::{AlphaMode, Filter, Image, ImageSource, Material, Mesh, Texture, TextureRef, Wrap};
 
-use super::Resources;
 use super::text::{Scanner, narrow, shown};
+use super::{Resources, warn_of};
+
+/// More materials than any real file has; a material is many times larger than its line in a file.
+pub(super) const MOST_MATERIALS: usize = 65_536;
 
 /// What libraries fill: the materials of a mesh, found by name.
 #[derive(Default)]
@@ -26,17 +29,16 @@ struct MapOptions {
 }
 
 impl Materials {
-    /// The number of a material, made up (and counted by the caller) if no library has it.
+    /// The number of a material, if a library has it.
     pub(super) fn find(&self, name: &[u8]) -> Option<u32> {
         self.by_name.get(name).copied()
     }
 
-    /// A material known by name only.
-    pub(super) fn add_default(&mut self, name: &[u8]) -> u32 {
-        self.add(name)
-    }
-
-    fn add(&mut self, name: &[u8]) -> u32 {
+    /// Adds a material of which only the name is known; without effect, if there are absurdly many.
+    pub(super) fn add(&mut self, name: &[u8]) -> u32 {
+        if self.materials.len() >= MOST_MATERIALS {
+            return Mesh::NO_MATERIAL;
+        }
         let index = u32::try_from(self.materials.len()).unwrap_or(Mesh::NO_MATERIAL);
         self.materials.push(Material { name: shown(name), ..Material::default() });
         // Of two materials with one name, the first counts.
@@ -56,22 +58,24 @@ impl Materials {
         let mut has_dissolve = false;
         while let Some(keyword) = scanner.word() {
             if keyword == b"newmtl" {
-                let name = scanner.rest_of_line();
-                self.add(name);
-                current = Some(self.materials.len() - 1);
+                current = (self.materials.len() < MOST_MATERIALS).then_some(self.materials.len());
+                self.add(scanner.rest_of_line());
                 has_dissolve = false;
-            } else if keyword.starts_with(b"map_") && current.is_some() {
-                let line = scanner.rest_of_line();
-                self.map(keyword, line, current.unwrap_or(0), resources);
-            } else if let Some(material) = current.and_then(|index| self.materials.get_mut(index)) {
-                set(material, keyword, &mut scanner, &mut has_dissolve);
+            } else if let Some(index) = current {
+                // Some exporters write `map_kd`.
+                let keyword = keyword.to_ascii_lowercase();
+                if keyword.starts_with(b"map_") {
+                    self.map(&keyword, scanner.rest_of_line(), index, resources);
+                } else if let Some(material) = self.materials.get_mut(index) {
+                    set(material, &keyword, &mut scanner, &mut has_dissolve);
+                }
             }
             scanner.rest_of_line();
         }
     }
 
     fn map(&mut self, keyword: &[u8], line: &[u8], material: usize, resources: &dyn Resources) {
-        if !matches!(keyword, b"map_Kd" | b"map_Ke" | b"map_d") {
+        if !matches!(keyword, b"map_kd" | b"map_ke" | b"map_d") {
             return;
         }
         let (options, file) = split_options(line);
@@ -86,8 +90,8 @@ impl Materials {
         let texture = Some(TextureRef { texture: index, uv_set: 0, transform });
         let Some(material) = self.materials.get_mut(material) else { return };
         match keyword {
-            b"map_Kd" => material.base_color_texture = texture,
-            b"map_Ke" => material.emissive_texture = texture,
+            b"map_kd" => material.base_color_texture = texture,
+            b"map_ke" => material.emissive_texture = texture,
             _ => {
                 material.opacity_texture = texture;
                 material.alpha_mode = AlphaMode::Blend;
@@ -113,18 +117,7 @@ impl Materials {
     }
 }
 
-/// Warns of things by name, of many only of the first few.
-pub(super) fn warn_of(warnings: &mut Vec<String>, names: &[String], kind: &str, what: &str) {
-    const NAMED: usize = 5;
-    for name in names.iter().take(NAMED) {
-        warnings.push(format!("the {kind} `{name}` is {what}"));
-    }
-    if names.len() > NAMED {
-        warnings.push(format!("the same for {} more of kind {kind}", names.len() - NAMED));
-    }
-}
-
-/// Sets the part of a material that a line is about. `Kd` and `Ke` are linear, as the exporters of modelling programs
+/// Sets the part of a material that a line is about; the keyword in lower case. `Kd` and `Ke` are linear, as the exporters of modelling programs
 /// write them.
 fn set(material: &mut Material, keyword: &[u8], scanner: &mut Scanner<'_>, has_dissolve: &mut bool) {
     let mut numbers = [f64::NAN; 3];
@@ -136,18 +129,18 @@ fn set(material: &mut Material, keyword: &[u8], scanner: &mut Scanner<'_>, has_d
     // One number stands for all three.
     let color = if found == 3 { numbers } else { [numbers[0]; 3] };
     match keyword {
-        b"Kd" => material.base_color[..3].copy_from_slice(&color.map(unit)),
-        b"Ke" => material.emissive = color.map(|c| narrow(c.max(0.0))),
+        b"kd" => material.base_color[..3].copy_from_slice(&color.map(unit)),
+        b"ke" => material.emissive = color.map(|c| narrow(c.max(0.0))),
         b"d" => {
             *has_dissolve = true;
             set_opacity(material, unit(numbers[0]));
         }
         // Where a file has both, `Tr` is often written the wrong way round. So is a `Tr` of 1 alone: nobody means a
         // material that cannot be seen.
-        b"Tr" if !*has_dissolve && numbers[0] < 1.0 => set_opacity(material, unit(1.0 - numbers[0])),
-        b"Ni" => material.index_of_refraction = narrow(numbers[0]),
-        b"Pm" => material.metallic = unit(numbers[0]),
-        b"Pr" => material.roughness = unit(numbers[0]),
+        b"tr" if !*has_dissolve && numbers[0] < 1.0 => set_opacity(material, unit(1.0 - numbers[0])),
+        b"ni" => material.index_of_refraction = narrow(numbers[0]),
+        b"pm" => material.metallic = unit(numbers[0]),
+        b"pr" => material.roughness = unit(numbers[0]),
         _ => {}
     }
 }
@@ -259,6 +252,14 @@ mod tests {
         assert!(mesh.materials[0].emissive_texture.is_some());
         assert!(mesh.materials[1].opacity_texture.is_none());
         assert_eq!(warnings, ["the texture `1 missing.png` is not there; materials stay without"]);
+    }
+
+    #[test]
+    fn keywords_in_any_case() {
+        let (mesh, _) = read("newmtl a\nkd 0 1 0\nmap_kd a.png\nMAP_D b.png\n");
+        let material = &mesh.materials[0];
+        assert_eq!(material.base_color, [0.0, 1.0, 0.0, 1.0]);
+        assert!(material.base_color_texture.is_some() && material.opacity_texture.is_some());
     }
 
     #[test]

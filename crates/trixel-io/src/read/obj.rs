@@ -9,13 +9,13 @@ use memchr::memchr2;
 use trixel::{Attribute, Mesh};
 
 use super::color::{Scale, VertexColors};
-use super::mtl::{Materials, warn_of};
+use super::mtl::{MOST_MATERIALS, Materials};
 use super::polygon::{Faces, fan};
 use super::text::{self, Scanner, line_at, narrow, shown};
-use super::{Loaded, Problem, ReadOptions, Resources};
+use super::{Loaded, Problem, ReadOptions, Resources, warn_of};
 
-/// More material libraries than any real file has; each may be as large as it likes.
-const MOST_LIBRARIES: usize = 64;
+/// More material libraries than any real file names; each costs a look into the folder, and may be as large as it likes.
+const MOST_LIBRARIES: usize = 256;
 
 /// A corner without texture coordinates or normal.
 const NONE: u32 = Attribute::<[f32; 2]>::NONE;
@@ -215,6 +215,7 @@ impl Reader {
     fn use_material(&mut self, name: &[u8]) {
         let index = match self.used_by_name.get(name) {
             Some(&index) => index,
+            None if self.used.len() >= MOST_MATERIALS => Mesh::NO_MATERIAL,
             None => {
                 let index = u32::try_from(self.used.len()).unwrap_or(Mesh::NO_MATERIAL);
                 self.used.push(name.to_vec());
@@ -281,7 +282,7 @@ impl Reader {
             .map(|name| {
                 materials.find(name).unwrap_or_else(|| {
                     unknown.push(shown(name));
-                    materials.add_default(name)
+                    materials.add(name)
                 })
             })
             .collect();
@@ -295,7 +296,8 @@ impl Reader {
             mesh.triangle_materials = vec![Mesh::NO_MATERIAL; self.material_runs[0].0];
             mesh.triangle_materials.reserve_exact(count - self.material_runs[0].0);
             for (&(_, used), end) in self.material_runs.iter().zip(starts) {
-                mesh.triangle_materials.resize(end, numbers[used as usize]);
+                let material = numbers.get(used as usize).copied().unwrap_or(Mesh::NO_MATERIAL);
+                mesh.triangle_materials.resize(end, material);
             }
         }
         materials.finish(mesh, warnings);
@@ -304,26 +306,24 @@ impl Reader {
     /// Loads each library once, and returns whether all are there. A line may name several, or one with spaces in its
     /// name.
     fn load_libraries(&self, materials: &mut Materials, resources: &dyn Resources, warnings: &mut Vec<String>) -> bool {
-        let (mut tried, mut missing, mut loaded) = (HashSet::new(), Vec::new(), 0);
+        let (mut tried, mut missing) = (HashSet::new(), Vec::new());
         for line in &self.libraries {
-            let mut load = |name: &[u8], missing: &mut Vec<String>| {
+            let mut load = |name: &[u8]| {
                 if !tried.insert(name.to_vec()) {
                     return true;
                 }
-                if loaded >= MOST_LIBRARIES {
-                    missing.push(shown(name));
+                if tried.len() > MOST_LIBRARIES {
                     return false;
                 }
                 match resources.load(&String::from_utf8_lossy(name)) {
                     Ok(bytes) => {
-                        loaded += 1;
                         materials.read(text::without_byte_order_mark(&bytes), resources);
                         true
                     }
                     Err(_) => false,
                 }
             };
-            if load(line, &mut missing) {
+            if load(line) {
                 continue;
             }
             let mut names: Vec<&[u8]> = line.split(u8::is_ascii_whitespace).filter(|name| !name.is_empty()).collect();
@@ -333,7 +333,7 @@ impl Reader {
                 missing.push(shown(line));
             }
             for name in names {
-                if !load(name, &mut missing) {
+                if !load(name) {
                     missing.push(shown(name));
                 }
             }

@@ -9,7 +9,7 @@ use super::color::{Scale, VertexColors};
 use super::ply_header::{Element, Encoding, Header, Kind, Property, Scalar};
 use super::polygon::{Faces, fan};
 use super::text::{self, Scanner, narrow, shown};
-use super::{Loaded, Problem, ReadOptions, Resources};
+use super::{Loaded, Problem, ReadOptions, Resources, warn_of};
 
 pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resources) -> Result<Loaded, Problem> {
     let bytes = text::without_byte_order_mark(bytes);
@@ -524,6 +524,7 @@ fn skip_element<S: Source>(source: &mut S, element: &Element<'_>) -> Result<(), 
 
 /// One material for each texture that the header names.
 fn add_textures(mesh: &mut Mesh, names: &[String], resources: &dyn Resources, warnings: &mut Vec<String>) {
+    let mut missing = Vec::new();
     for name in names {
         let mut material = Material { name: name.clone(), ..Material::default() };
         match resources.locate(name) {
@@ -533,10 +534,11 @@ fn add_textures(mesh: &mut Mesh, names: &[String], resources: &dyn Resources, wa
                 mesh.textures.push(Texture { image, wrap: Default::default(), filter: Default::default() });
                 material.base_color_texture = Some(TextureRef::new(image));
             }
-            None => warnings.push(format!("the texture `{name}` is not there; its faces stay without")),
+            None => missing.push(name.clone()),
         }
         mesh.materials.push(material);
     }
+    warn_of(warnings, &missing, "texture", "not there; its faces stay without");
 }
 
 /// The material of each triangle from runs of texture numbers; faces without a number have the first texture.

@@ -3,6 +3,9 @@
 use super::Problem;
 use super::text::{self, Scanner, shown};
 
+/// More textures than any real file names; each costs a look into the folder and becomes a material.
+const MOST_TEXTURES: usize = 4096;
+
 /// The type of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scalar {
@@ -82,7 +85,7 @@ pub(super) enum Encoding {
 pub(super) struct Header<'a> {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element<'a>>,
-    /// The file names of `comment TextureFile` lines.
+    /// The file names of `comment TextureFile` lines, at most [`MOST_TEXTURES`].
     pub(super) textures: Vec<String>,
     /// Where the data starts.
     pub(super) end: usize,
@@ -113,7 +116,7 @@ impl<'a> Header<'a> {
                         }
                     });
                 }
-                b"comment" if scanner.word_on_line() == Some(b"TextureFile") => {
+                b"comment" if scanner.word_on_line() == Some(b"TextureFile") && textures.len() < MOST_TEXTURES => {
                     textures.push(shown(scanner.rest_of_line()));
                 }
                 b"element" => {

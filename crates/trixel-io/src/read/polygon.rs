@@ -149,12 +149,15 @@ impl Outline {
         }
         let points: Vec<[f64; 2]> = (0..polygon.len()).map(|c| at(c).map(|p| [p[u], p[v]])).collect::<Option<_>>()?;
         // Coordinates of size `reach` that were rounded to f32 are off by up to reach * 2^-24 each, which moves the
-        // doubled area of a corner by up to twice that times the lengths (in the 1-norm) of its two edges.
-        let slack = reach * 2f64.powi(-23);
+        // doubled area of a corner by up to twice that times the lengths (in the 1-norm) of its two edges. A straight
+        // corner may turn by that much. But one that turns by more than about 2^-10 is never taken for straight: far
+        // from the origin coordinates may well hold more digits than f32 does.
+        let rounding = reach * 2f64.powi(-23);
+        let slack = |a: f64, b: f64| (rounding * (a + b)).min(2f64.powi(-10) * a * b);
         let n = points.len();
         let clearly_reflex = (0..n).any(|i| {
             let (a, b, c) = (points[(i + n - 1) % n], points[i], points[(i + 1) % n]);
-            turn(a, b, c) < -slack * (distance(a, b) + distance(b, c))
+            turn(a, b, c) < -slack(distance(a, b), distance(b, c))
         });
         let index = u32::try_from(n).ok()?;
         clearly_reflex.then(|| Self {
@@ -354,6 +357,12 @@ mod tests {
     #[test]
     fn concave_quad_is_cut_at_its_reflex_corner() {
         check(&[[0.0, 0.0], [2.0, -1.0], [0.5, 0.0], [2.0, 1.0]], 0.5);
+    }
+
+    #[test]
+    fn small_concave_polygons_far_from_the_origin() {
+        let arrow = [[0.0, 0.0], [0.5, -0.25], [0.125, 0.0], [0.5, 0.25]];
+        check(&arrow.map(|[x, y]| [x + 500_000.0, y + 4_000_000.0]), 0.03125);
     }
 
     #[test]

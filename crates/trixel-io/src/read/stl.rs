@@ -99,10 +99,12 @@ fn read_ascii(bytes: &[u8]) -> Result<Loaded, Problem> {
             facet.get_or_insert(positions.len());
             positions.push(position);
         } else if is("facet") {
-            scanner.skip_line();
             if facet.is_some() {
                 return Err(scanner.problem("this facet starts before the last one ends with `endfacet`"));
             }
+        } else if is("normal") {
+            // Words, not numbers: some exporters write `-nan(ind)` for a triangle without an area.
+            (0..3).for_each(|_| _ = scanner.word_on_line());
         } else if is("endfacet") {
             let first = facet.take().unwrap_or(positions.len());
             corners.clear();

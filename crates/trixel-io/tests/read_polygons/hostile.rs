@@ -168,6 +168,29 @@ fn huge_lines_words_and_polygons() {
         try_read(MeshFormat::Ply, format!("ply\nformat ascii 1.0\n{}end_header\n", many("element a 9\n")).as_bytes());
 }
 
+/// Names of files that are not there cost a look each; in a real folder, for the look into it.
+#[test]
+fn hundreds_of_thousands_of_missing_files() {
+    let folder = std::env::temp_dir().join(format!("trixel-missing-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let lines = |prefix: &str| -> String { (0..300_000).map(|i| format!("{prefix}{i}\n")).collect() };
+    let obj = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{}{}f 1 2 3\n", lines("mtllib "), lines("usemtl "));
+    let ply = format!(
+        "ply\nformat ascii 1.0\n{}element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
+         property list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+        lines("comment TextureFile ")
+    );
+    for (name, text) in [("mesh.obj", obj), ("mesh.ply", ply)] {
+        let path = folder.join(name);
+        std::fs::write(&path, text).unwrap();
+        let start = Instant::now();
+        let loaded = trixel_io::read::read_mesh(&path, &ReadOptions::default()).unwrap();
+        assert!(start.elapsed() < Duration::from_secs(3), "{name} took {:?}", start.elapsed());
+        assert!(loaded.warnings.len() < 20 && loaded.mesh.materials.len() <= 65_536);
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
 /// Concave, self-crossing and huge: the worst for ear clipping.
 #[test]
 fn a_polygon_of_a_hundred_thousand_random_corners() {

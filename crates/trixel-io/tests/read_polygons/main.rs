@@ -8,7 +8,6 @@ mod models;
 mod obj;
 mod off;
 mod ply;
-mod regressions;
 mod stl;
 
 use trixel_io::read::{Loaded, MeshFormat, ReadError, ReadOptions, read_mesh_bytes};

@@ -227,6 +227,22 @@ fn a_missing_library_is_a_warning() {
 }
 
 #[test]
+fn many_warnings_of_one_kind_are_counted() {
+    let uses: String = (0..9).map(|i| format!("usemtl m{i}\nf 1 2 3\n")).collect();
+    let loaded = read(&format!("{TRIANGLE}{uses}"));
+    assert_eq!(loaded.warnings.len(), 6);
+    assert_eq!(loaded.warnings[5], "4 more warnings like the last, each about another material");
+}
+
+#[test]
+fn absurdly_many_materials_are_cut_off() {
+    let uses: String = (0..70_000).map(|i| format!("usemtl {i}\nf 1 2 3\n")).collect();
+    let mesh = read(&format!("{TRIANGLE}{uses}")).mesh;
+    assert_eq!(mesh.materials.len(), 65_536);
+    assert_eq!(mesh.triangle_materials[65_535..65_537], [65_535, Mesh::NO_MATERIAL]);
+}
+
+#[test]
 fn no_face_is_empty() {
     assert!(super::is_empty(MeshFormat::Obj, TRIANGLE));
     assert!(super::is_empty(MeshFormat::Obj, "f 1\nv 0 0 0\n"));

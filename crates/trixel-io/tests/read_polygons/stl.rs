@@ -100,6 +100,15 @@ fn facets_of_four_corners_and_of_two() {
 }
 
 #[test]
+fn facets_on_one_line_and_normals_that_are_no_numbers() {
+    let facet =
+        "facet normal -nan(ind) -nan(ind) -nan(ind) outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet";
+    let loaded = read(format!("solid a\n{facet} {facet}\nendsolid"));
+    assert_eq!(loaded.mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
+    assert!(loaded.warnings.is_empty());
+}
+
+#[test]
 fn a_wrong_number_names_its_line() {
     let message = error("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 zero 0\n");
     assert!(message.contains("line 4: expected a coordinate, found `zero`"), "{message}");
