@@ -234,7 +234,13 @@ impl<T> Default for Corners<T> {
 }
 
 impl<T: Copy> Corners<T> {
-    fn add(&mut self, triangle: usize, group: u32, entries: [u32; 3], value: impl Fn(usize) -> Option<T>) -> Option<()> {
+    fn add(
+        &mut self,
+        triangle: usize,
+        group: u32,
+        entries: [u32; 3],
+        value: impl Fn(usize) -> Option<T>,
+    ) -> Option<()> {
         let mut corners = [Attribute::<T>::NONE; 3];
         for (corner, entry) in corners.iter_mut().zip(entries) {
             *corner = match self.known.get(&(group, entry)) {
