@@ -179,8 +179,7 @@ fn cycles_and_second_parents_are_refused_by_name() {
 fn chain_of_a_hundred_thousand_nodes() {
     let mut document = square_document();
     let nodes = 100_000;
-    let mut list: Vec<Value> =
-        (1..nodes).map(|i| json!({"children": [i], "translation": [0.5, 0, 0]})).collect();
+    let mut list: Vec<Value> = (1..nodes).map(|i| json!({"children": [i], "translation": [0.5, 0, 0]})).collect();
     list.push(json!({"mesh": 0}));
     document["nodes"] = list.into();
     assert_eq!(load(&document).mesh.positions[0][0], 0.5 * 99_999.0);
@@ -525,7 +524,8 @@ fn lying_views_and_accessors_are_refused() {
 #[test]
 fn positions_that_are_not_finite_are_refused() {
     let mut document = square_document();
-    let bad = add_accessor(&mut document, &floats(&[0.0, 0.0, 0.0, 1.0, f32::NAN, 0.0, 0.0, 1.0, 0.0]), 5126, 3, "VEC3");
+    let bad =
+        add_accessor(&mut document, &floats(&[0.0, 0.0, 0.0, 1.0, f32::NAN, 0.0, 0.0, 1.0, 0.0]), 5126, 3, "VEC3");
     document["meshes"][0]["primitives"] = json!([{"attributes": {"POSITION": bad}}]);
     assert_refused(&document, "mesh 0, primitive 0", "vertex 1 is not finite");
 }
