@@ -4,8 +4,8 @@ use std::io::{self, BufReader, Cursor, Read};
 
 use quick_xml::Reader;
 use quick_xml::events::Event;
-use zip::ZipArchive;
 use zip::result::ZipError;
+use zip::{CompressionMethod, ZipArchive};
 
 use crate::read::Problem;
 
@@ -71,16 +71,18 @@ impl<'a> Package<'a> {
 
     /// Opens a part to be read as it expands.
     pub(super) fn part(&mut self, name: &str) -> Result<BufReader<impl Read + '_>, Problem> {
-        let damaged = |error: ZipError| match error {
-            ZipError::CompressionMethodNotSupported(_) | ZipError::UnsupportedArchive(_) => {
-                Problem::new(name, format!("{error}; pack the file again with plain deflate"))
-            }
-            _ => Problem::new(name, format!("{error}; the file is damaged")),
-        };
         let Some(index) = self.find(name) else {
             return Err(Problem::new(name, "is not in the package; the file is damaged or no 3MF"));
         };
+        let damaged = |error: ZipError| Problem::new(name, format!("{error}; the file is damaged, or encrypted"));
         let part = self.archive.by_index(index).map_err(damaged)?;
+        let method = part.compression();
+        if !matches!(method, CompressionMethod::Stored | CompressionMethod::Deflated) {
+            return Err(Problem::new(
+                name,
+                format!("is compressed with {method}, which 3MF does not allow; pack the file again with deflate"),
+            ));
+        }
         Ok(BufReader::with_capacity(1 << 16, Limited { part, limit: self.limit, expanded: &mut self.expanded }))
     }
 
