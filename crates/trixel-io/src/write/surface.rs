@@ -196,17 +196,18 @@ fn run_end(row: &[u64], first: usize) -> usize {
 
 /// Clears the bits `first..end` of a row if all of them are set.
 fn take_run(row: &mut [u64], first: usize, end: usize) -> bool {
-    let last = (end - 1) / WORD;
+    let (start, last) = (first / WORD, (end - 1) / WORD);
     let mask = |word: usize| {
-        let from = if word == first / WORD { u64::MAX << (first % WORD) } else { u64::MAX };
+        let from = if word == start { u64::MAX << (first % WORD) } else { u64::MAX };
         let to = if word == last { u64::MAX >> (WORD - 1 - (end - 1) % WORD) } else { u64::MAX };
         from & to
     };
-    if (first / WORD..=last).any(|word| row[word] & mask(word) != mask(word)) {
+    let words = &mut row[start..=last];
+    if !(start..).zip(words.iter()).all(|(word, bits)| bits & mask(word) == mask(word)) {
         return false;
     }
-    for word in first / WORD..=last {
-        row[word] &= !mask(word);
+    for (word, bits) in (start..).zip(words) {
+        *bits &= !mask(word);
     }
     true
 }
