@@ -1,11 +1,11 @@
 //! Streams of array elements, packed into a volume: an element that is not zero is a set voxel.
 
-use std::io::{self, Read};
+use std::io::{self, BufReader, Read};
 
 use rayon::prelude::*;
 use trixel::Volume;
 
-use super::Failure;
+use super::{BUFFER_BYTES, Failure};
 use crate::bits::{WORD, pack, transpose, words_for};
 
 /// How an element is stored.
@@ -26,8 +26,9 @@ impl Element {
 }
 
 /// Rows of elements, read one by one as bits.
-struct Rows<R> {
-    reader: R,
+struct Rows<R: Read> {
+    /// Rows are short, and decoders slow at handing out little.
+    reader: BufReader<R>,
     element: Element,
     buffer: Vec<u8>,
     flags: Vec<u8>,
@@ -38,6 +39,7 @@ impl<R: Read> Rows<R> {
         let length = length as usize;
         // Elements of one byte need no flags of their own.
         let flags = if element == Element::BYTE { Vec::new() } else { vec![0; length] };
+        let reader = BufReader::with_capacity(BUFFER_BYTES, reader);
         Self { reader, element, buffer: vec![0; length * element.bytes], flags }
     }
 

@@ -9,11 +9,11 @@ use zip::read::ZipFile;
 use zip::result::ZipError;
 
 use super::npy::NpyHeader;
-use super::{DEFLATE_RATIO, Failure, Input, LoadedGrid, LoadedVolume, check_backing, to_dims};
+use super::{BUFFER_BYTES, DEFLATE_RATIO, Failure, Input, LoadedGrid, LoadedVolume, check_backing, to_dims};
 
 type Entry<'a> = ZipFile<'a, BufReader<File>>;
 /// Reads one number.
-type NumberReader = fn(&mut Entry<'_>) -> Result<f64, Failure>;
+type NumberReader = fn(&mut dyn Read) -> Result<f64, Failure>;
 
 impl From<ZipError> for Failure {
     fn from(error: ZipError) -> Self {
@@ -99,21 +99,21 @@ impl Archive {
 
 /// A function that reads one number of NumPy type `dtype`.
 fn number_reader(name: &str, dtype: &str) -> Result<NumberReader, Failure> {
-    fn bytes<const N: usize>(entry: &mut Entry<'_>) -> Result<[u8; N], Failure> {
+    fn bytes<const N: usize>(reader: &mut dyn Read) -> Result<[u8; N], Failure> {
         let mut bytes = [0; N];
-        entry.read_exact(&mut bytes)?;
+        reader.read_exact(&mut bytes)?;
         Ok(bytes)
     }
     #[expect(clippy::cast_precision_loss, reason = "indices and dimensions are small; larger ones are refused after")]
     Ok(match dtype {
-        "<f8" => |entry| Ok(f64::from_le_bytes(bytes(entry)?)),
-        "<f4" => |entry| Ok(f64::from(f32::from_le_bytes(bytes(entry)?))),
-        "<i4" => |entry| Ok(f64::from(i32::from_le_bytes(bytes(entry)?))),
-        "<u4" => |entry| Ok(f64::from(u32::from_le_bytes(bytes(entry)?))),
-        "<i2" => |entry| Ok(f64::from(i16::from_le_bytes(bytes(entry)?))),
-        "<u2" => |entry| Ok(f64::from(u16::from_le_bytes(bytes(entry)?))),
-        "<i8" => |entry| Ok(i64::from_le_bytes(bytes(entry)?) as f64),
-        "<u8" => |entry| Ok(u64::from_le_bytes(bytes(entry)?) as f64),
+        "<f8" => |reader| Ok(f64::from_le_bytes(bytes(reader)?)),
+        "<f4" => |reader| Ok(f64::from(f32::from_le_bytes(bytes(reader)?))),
+        "<i4" => |reader| Ok(f64::from(i32::from_le_bytes(bytes(reader)?))),
+        "<u4" => |reader| Ok(f64::from(u32::from_le_bytes(bytes(reader)?))),
+        "<i2" => |reader| Ok(f64::from(i16::from_le_bytes(bytes(reader)?))),
+        "<u2" => |reader| Ok(f64::from(u16::from_le_bytes(bytes(reader)?))),
+        "<i8" => |reader| Ok(i64::from_le_bytes(bytes(reader)?) as f64),
+        "<u8" => |reader| Ok(u64::from_le_bytes(bytes(reader)?) as f64),
         other => {
             let what = format!("values of type {other} are not read; store little-endian int32, int64 or float64");
             return Err(Failure::damaged(name, what));
@@ -145,7 +145,9 @@ pub(super) fn volume(input: Input, memory_limit: Option<u64>) -> Result<LoadedVo
 /// Sets the voxels that the rows of `indices` name.
 fn read_indices(archive: &mut Archive, volume: &mut Volume) -> Result<(), Failure> {
     let at = "indices";
-    let (header, mut entry) = archive.array(at)?;
+    let (header, entry) = archive.array(at)?;
+    // Numbers are read one by one.
+    let mut entry = BufReader::with_capacity(BUFFER_BYTES, entry);
     let &[rows, 3] = header.shape.as_slice() else {
         return Err(Failure::damaged(at, format!("shape {:?} should be [N, 3]", header.shape)));
     };
