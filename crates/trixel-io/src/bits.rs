@@ -17,7 +17,9 @@ const SPREAD: [[u8; 8]; 256] = {
     while value < 256 {
         let mut bit = 0;
         while bit < 8 {
-            table[value][bit] = (value >> bit & 1) as u8;
+            if value >> bit & 1 == 1 {
+                table[value][bit] = 1;
+            }
             bit += 1;
         }
         value += 1;

@@ -1,5 +1,5 @@
 //! What the writers write, the readers read back to the bit; damaged files are refused; nothing half-written stays.
-#![expect(missing_docs, reason = "a test")]
+#![allow(clippy::unwrap_used, reason = "a test")]
 
 mod common;
 

@@ -10,7 +10,7 @@ use trixel::{Grid, Volume};
 use super::{Failure, Input, LoadedGrid, LoadedVolume, check_backing, to_dims};
 use crate::bits::{WORD, transpose, words_for};
 
-/// Lines of a header; comments do not exist.
+/// Five lines, and comments.
 const MAX_HEADER: u64 = 1 << 12;
 /// A pair of bytes is a run of at most 255 voxels.
 const VOXELS_PER_PAIR: u64 = 255;
@@ -40,6 +40,7 @@ fn read_header(input: &mut Input) -> Result<Grid, Failure> {
         let numbers: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();
         match (keyword, numbers.as_deref()) {
             ("data", _) => break,
+            (comment, _) if comment.starts_with('#') => {}
             ("dim", Some(&[x, z, y])) if x == y && y == z && x.fract() == 0.0 && x >= 1.0 => dims = Some(x),
             ("dim", Some(&[x, z, y])) => {
                 return Err(damaged(format!("dim {x} {z} {y}: binvox files are cubes, and only those are read")));

@@ -1,11 +1,11 @@
 //! Streams of array elements, packed into a volume: an element that is not zero is a set voxel.
 
-use std::io::{self, Read};
+use std::io::{self, BufReader, Read};
 
 use rayon::prelude::*;
 use trixel::Volume;
 
-use super::Failure;
+use super::{BUFFER_BYTES, Failure};
 use crate::bits::{WORD, pack, transpose, words_for};
 
 /// How an element is stored.
@@ -26,8 +26,9 @@ impl Element {
 }
 
 /// Rows of elements, read one by one as bits.
-struct Rows<R> {
-    reader: R,
+struct Rows<R: Read> {
+    /// Rows are short, and decoders slow at handing out little.
+    reader: BufReader<R>,
     element: Element,
     buffer: Vec<u8>,
     flags: Vec<u8>,
@@ -38,6 +39,7 @@ impl<R: Read> Rows<R> {
         let length = length as usize;
         // Elements of one byte need no flags of their own.
         let flags = if element == Element::BYTE { Vec::new() } else { vec![0; length] };
+        let reader = BufReader::with_capacity(BUFFER_BYTES, reader);
         Self { reader, element, buffer: vec![0; length * element.bytes], flags }
     }
 
@@ -80,22 +82,24 @@ pub(super) fn read_x_fastest(reader: impl Read, element: Element, volume: &mut V
     let row_words = words_for(volume.grid().dims()[0]);
     let mut rows = Rows::new(reader, element, volume.grid().dims()[0]);
     // 64 layers as bits, each line's together: `slab[y][z][..]`.
-    let mut slab = vec![0; ny * WORD * row_words];
+    // Flat grids have fewer.
+    let depth = WORD.min(nz);
+    let mut slab = vec![0; ny * depth * row_words];
     for word in 0..column_words {
         let layers = (nz - word * WORD).min(WORD);
-        if layers < WORD {
-            slab.fill(0);
-        }
         for z in 0..layers {
             for y in 0..ny {
-                let start = (y * WORD + z) * row_words;
+                let start = (y * depth + z) * row_words;
                 rows.read(&mut slab[start..start + row_words])?;
             }
         }
         // 64 planes x at a time, so that each square of bits is turned once.
         volume.words_mut().par_chunks_mut(WORD * ny * column_words).enumerate().for_each(|(group, planes)| {
             for y in 0..ny {
-                let mut square: [u64; WORD] = std::array::from_fn(|z| slab[(y * WORD + z) * row_words + group]);
+                let mut square = [0; WORD];
+                for (z, row) in square.iter_mut().enumerate().take(layers) {
+                    *row = slab[(y * depth + z) * row_words + group];
+                }
                 if square.iter().all(|&row| row == 0) {
                     continue;
                 }

@@ -134,6 +134,9 @@ impl Failure {
     }
 }
 
+/// Reads of a few bytes each are served from buffers of this size.
+const BUFFER_BYTES: usize = 1 << 16;
+
 /// An opened file and its length.
 struct Input {
     reader: BufReader<File>,
@@ -147,7 +150,7 @@ impl Input {
         if metadata.is_dir() {
             return Err(io::Error::from(io::ErrorKind::IsADirectory));
         }
-        Ok(Self { reader: BufReader::with_capacity(1 << 16, file), bytes: metadata.len() })
+        Ok(Self { reader: BufReader::with_capacity(BUFFER_BYTES, file), bytes: metadata.len() })
     }
 }
 

@@ -9,9 +9,11 @@ use zip::read::ZipFile;
 use zip::result::ZipError;
 
 use super::npy::NpyHeader;
-use super::{DEFLATE_RATIO, Failure, Input, LoadedGrid, LoadedVolume, check_backing, to_dims};
+use super::{BUFFER_BYTES, DEFLATE_RATIO, Failure, Input, LoadedGrid, LoadedVolume, check_backing, to_dims};
 
 type Entry<'a> = ZipFile<'a, BufReader<File>>;
+/// Reads one number.
+type NumberReader = fn(&mut dyn Read) -> Result<f64, Failure>;
 
 impl From<ZipError> for Failure {
     fn from(error: ZipError) -> Self {
@@ -96,22 +98,22 @@ impl Archive {
 }
 
 /// A function that reads one number of NumPy type `dtype`.
-fn number_reader(name: &str, dtype: &str) -> Result<fn(&mut Entry<'_>) -> Result<f64, Failure>, Failure> {
-    fn bytes<const N: usize>(entry: &mut Entry<'_>) -> Result<[u8; N], Failure> {
+fn number_reader(name: &str, dtype: &str) -> Result<NumberReader, Failure> {
+    fn bytes<const N: usize>(reader: &mut dyn Read) -> Result<[u8; N], Failure> {
         let mut bytes = [0; N];
-        entry.read_exact(&mut bytes)?;
+        reader.read_exact(&mut bytes)?;
         Ok(bytes)
     }
     #[expect(clippy::cast_precision_loss, reason = "indices and dimensions are small; larger ones are refused after")]
     Ok(match dtype {
-        "<f8" => |entry| Ok(f64::from_le_bytes(bytes(entry)?)),
-        "<f4" => |entry| Ok(f64::from(f32::from_le_bytes(bytes(entry)?))),
-        "<i4" => |entry| Ok(f64::from(i32::from_le_bytes(bytes(entry)?))),
-        "<u4" => |entry| Ok(f64::from(u32::from_le_bytes(bytes(entry)?))),
-        "<i2" => |entry| Ok(f64::from(i16::from_le_bytes(bytes(entry)?))),
-        "<u2" => |entry| Ok(f64::from(u16::from_le_bytes(bytes(entry)?))),
-        "<i8" => |entry| Ok(i64::from_le_bytes(bytes(entry)?) as f64),
-        "<u8" => |entry| Ok(u64::from_le_bytes(bytes(entry)?) as f64),
+        "<f8" => |reader| Ok(f64::from_le_bytes(bytes(reader)?)),
+        "<f4" => |reader| Ok(f64::from(f32::from_le_bytes(bytes(reader)?))),
+        "<i4" => |reader| Ok(f64::from(i32::from_le_bytes(bytes(reader)?))),
+        "<u4" => |reader| Ok(f64::from(u32::from_le_bytes(bytes(reader)?))),
+        "<i2" => |reader| Ok(f64::from(i16::from_le_bytes(bytes(reader)?))),
+        "<u2" => |reader| Ok(f64::from(u16::from_le_bytes(bytes(reader)?))),
+        "<i8" => |reader| Ok(i64::from_le_bytes(bytes(reader)?) as f64),
+        "<u8" => |reader| Ok(u64::from_le_bytes(bytes(reader)?) as f64),
         other => {
             let what = format!("values of type {other} are not read; store little-endian int32, int64 or float64");
             return Err(Failure::damaged(name, what));
@@ -143,32 +145,37 @@ pub(super) fn volume(input: Input, memory_limit: Option<u64>) -> Result<LoadedVo
 /// Sets the voxels that the rows of `indices` name.
 fn read_indices(archive: &mut Archive, volume: &mut Volume) -> Result<(), Failure> {
     let at = "indices";
-    let (header, mut entry) = archive.array(at)?;
+    let (header, entry) = archive.array(at)?;
+    // Numbers are read one by one.
+    let mut entry = BufReader::with_capacity(BUFFER_BYTES, entry);
     let &[rows, 3] = header.shape.as_slice() else {
         return Err(Failure::damaged(at, format!("shape {:?} should be [N, 3]", header.shape)));
     };
-    if header.fortran {
-        return Err(Failure::damaged(at, "Fortran order is not read here; store the array in C order"));
-    }
     if header.dtype.as_bytes().get(1) == Some(&b'f') {
         return Err(Failure::damaged(at, format!("values of type {} cannot be indices; store int32", header.dtype)));
     }
     let number = number_reader(at, &header.dtype)?;
     let dims = volume.grid().dims();
-    for row in 0..rows {
-        let mut voxel = [0; 3];
-        for (index, n) in voxel.iter_mut().zip(dims) {
-            let value = number(&mut entry)?;
-            if !(0.0..f64::from(n)).contains(&value) {
-                let what = format!("index {value} of row {row} is outside the grid, whose axis has {n} voxels");
-                return Err(Failure::damaged(at, what));
-            }
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just above")]
-            {
-                *index = value as u32;
-            }
+    let mut next = |axis: usize, row: u64| -> Result<u32, Failure> {
+        let (value, n) = (number(&mut entry)?, dims[axis]);
+        if !(0.0..f64::from(n)).contains(&value) {
+            let what = format!("index {value} of row {row} is outside the grid, whose axis has {n} voxels");
+            return Err(Failure::damaged(at, what));
         }
-        volume.set(voxel);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just above")]
+        Ok(value as u32)
+    };
+    if header.fortran {
+        // Column after column, as `numpy.argwhere` leaves its result: grown as it is read, not by the stated length.
+        let xs = (0..rows).map(|row| next(0, row)).collect::<Result<Vec<_>, _>>()?;
+        let ys = (0..rows).map(|row| next(1, row)).collect::<Result<Vec<_>, _>>()?;
+        for ((row, x), y) in (0..rows).zip(xs).zip(ys) {
+            volume.set([x, y, next(2, row)?]);
+        }
+    } else {
+        for row in 0..rows {
+            volume.set([next(0, row)?, next(1, row)?, next(2, row)?]);
+        }
     }
     if entry.read(&mut [0])? != 0 {
         return Err(Failure::damaged(at, "there is more data than the header says"));

@@ -111,12 +111,14 @@ fn exposed(column: &[u64], neighbor: Option<&[u64]>, mask: &mut Vec<u64>) {
 fn z_faces(volume: &Volume, word: usize, positive: bool, found: &mut Vec<Rectangle>) {
     let [nx, ny, nz] = volume.grid().dims();
     let row_words = words_for(ny);
-    let row_length = WORD * row_words;
+    let first = word * WORD;
+    let layers = (nz as usize - first).min(WORD);
+    let row_length = layers * row_words;
     let mut slab = vec![0; nx as usize * row_length];
     slab.par_chunks_mut(row_length).zip(0..nx).for_each(|(rows, x)| {
-        for (group, first) in (0..ny).step_by(WORD).enumerate() {
+        for (group, first_y) in (0..ny).step_by(WORD).enumerate() {
             let mut square = [0; WORD];
-            for (y, row) in (first..ny).zip(&mut square) {
+            for (y, row) in (first_y..ny).zip(&mut square) {
                 let column = volume.column(x, y);
                 let set = column[word];
                 let beside = if positive {
@@ -131,13 +133,11 @@ fn z_faces(volume: &Volume, word: usize, positive: bool, found: &mut Vec<Rectang
             if square.iter().any(|&row| row != 0) {
                 transpose(&mut square);
             }
-            for (z, row) in square.into_iter().enumerate() {
+            for (z, row) in square.into_iter().enumerate().take(layers) {
                 rows[z * row_words + group] = row;
             }
         }
     });
-    let first = word * WORD;
-    let layers = (nz as usize - first).min(WORD);
     let slices: Vec<Vec<Rectangle>> = (0..layers)
         .into_par_iter()
         .map(|z| {
@@ -196,17 +196,18 @@ fn run_end(row: &[u64], first: usize) -> usize {
 
 /// Clears the bits `first..end` of a row if all of them are set.
 fn take_run(row: &mut [u64], first: usize, end: usize) -> bool {
-    let last = (end - 1) / WORD;
+    let (start, last) = (first / WORD, (end - 1) / WORD);
     let mask = |word: usize| {
-        let from = if word == first / WORD { u64::MAX << (first % WORD) } else { u64::MAX };
+        let from = if word == start { u64::MAX << (first % WORD) } else { u64::MAX };
         let to = if word == last { u64::MAX >> (WORD - 1 - (end - 1) % WORD) } else { u64::MAX };
         from & to
     };
-    if (first / WORD..=last).any(|word| row[word] & mask(word) != mask(word)) {
+    let words = &mut row[start..=last];
+    if !(start..).zip(words.iter()).all(|(word, bits)| bits & mask(word) == mask(word)) {
         return false;
     }
-    for word in first / WORD..=last {
-        row[word] &= !mask(word);
+    for (word, bits) in (start..).zip(words) {
+        *bits &= !mask(word);
     }
     true
 }

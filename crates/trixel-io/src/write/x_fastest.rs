@@ -5,7 +5,7 @@
 use std::io;
 
 use rayon::prelude::*;
-use trixel::{Volume, WORD_BITS};
+use trixel::Volume;
 
 use super::deflate::Fill;
 use crate::bits::{WORD, expand, transpose, words_for};
@@ -27,13 +27,15 @@ pub(super) fn for_each_batch(
     let row_words = words_for(nx);
     // Rows of the slabs before that did not fill a block, as bytes.
     let mut carry: Vec<u8> = Vec::new();
-    let mut slab = vec![0; ny_rows * WORD * row_words];
+    // Flat grids have fewer layers than a word has bits.
+    let depth = WORD.min(nz as usize);
+    let mut slab = vec![0; ny_rows * depth * row_words];
     for word in 0..volume.column_words() {
-        transpose_slab(volume, word, &mut slab);
-        // Row `r` of this slab is layer r / ny, line r % ny; the slab holds a line's 64 layers together.
+        transpose_slab(volume, word, depth, &mut slab);
+        // Row `r` of this slab is layer r / ny, line r % ny; the slab holds a line's layers together.
         let expand_rows = |rows: std::ops::Range<usize>, out: &mut Vec<u8>| {
             for row in rows {
-                let start = (row % ny_rows * WORD + row / ny_rows) * row_words;
+                let start = (row % ny_rows * depth + row / ny_rows) * row_words;
                 expand(&slab[start..start + row_words], nx, out);
             }
         };
@@ -62,13 +64,13 @@ pub(super) fn for_each_batch(
     Ok(())
 }
 
-/// Turns word `word` of every column into rows along x: `slab[y][z][..]`.
-fn transpose_slab(volume: &Volume, word: usize, slab: &mut [u64]) {
+/// Turns word `word` of every column into rows along x of its first `depth` layers: `slab[y][z][..]`.
+fn transpose_slab(volume: &Volume, word: usize, depth: usize, slab: &mut [u64]) {
     let [nx, ny, _] = volume.grid().dims();
     let row_words = words_for(nx);
     let column_words = volume.column_words();
     let words = volume.words();
-    slab.par_chunks_mut(WORD * row_words).enumerate().for_each(|(y, rows)| {
+    slab.par_chunks_mut(depth * row_words).enumerate().for_each(|(y, rows)| {
         for (group, first) in (0..nx as usize).step_by(WORD).enumerate() {
             let mut square = [0; WORD];
             for (x, row) in (first..nx as usize).zip(&mut square) {
@@ -78,10 +80,9 @@ fn transpose_slab(volume: &Volume, word: usize, slab: &mut [u64]) {
             if square.iter().any(|&row| row != 0) {
                 transpose(&mut square);
             }
-            for (z, row) in square.into_iter().enumerate() {
+            for (z, row) in square.into_iter().enumerate().take(depth) {
                 rows[z * row_words + group] = row;
             }
         }
     });
-    debug_assert_eq!(WORD_BITS as usize, WORD);
 }
