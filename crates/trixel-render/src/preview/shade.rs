@@ -29,8 +29,8 @@ const GROUND_BOUNCE: Vec3 = Vec3::new(0.40, 0.37, 0.35);
 /// A second light from the right, too weak to need shadows.
 const FILL_DIRECTION: Vec3 = Vec3::new(0.85, -0.45, 0.30);
 const FILL_COLOR: Vec3 = Vec3::new(0.10, 0.12, 0.15);
-/// One of so many samples sends a ray to the sky and one to the key light.
-const SAMPLES_PER_RAY: usize = 2;
+/// Rays to the sky, and as many to the key light, that the first sample of a pixel sends.
+const RAYS: usize = 2;
 /// How far rays to the sky look, as a share of the object's longest side.
 const SKY_REACH: f64 = 0.45;
 /// Voxels narrower than the first number of pixels are shaded by the smoothed normal, above the second by their faces.
@@ -49,6 +49,8 @@ pub(super) struct Pixel {
     pub position: Vec3,
     /// The normal there.
     pub normal: Vec3,
+    /// Whether the edge of a voxel is drawn close by.
+    pub detail: bool,
     /// Samples on the object.
     pub object: Visibility,
     /// Samples on the ground.
@@ -60,7 +62,7 @@ pub(super) struct Pixel {
 pub(super) struct Visibility {
     /// Share of the pixel's samples that see this kind of surface.
     pub coverage: f32,
-    /// How many of them sent rays to the sky and the key light.
+    /// Rays that were sent to the sky, and as many to the key light.
     pub rays: f32,
     /// Sum of the visible share of the sky over these.
     pub sky: f32,
@@ -93,7 +95,7 @@ pub(super) struct Scene<'a> {
     albedo: Vec3,
     voxel_edges: bool,
     kernel: Kernel,
-    /// Offsets of the samples within a pixel.
+    /// Offsets within a pixel of the samples after the first, which is in the middle.
     offsets: Vec<[f64; 2]>,
     /// Points of the unit disk that light and sky rays go through.
     disk: Vec<[f64; 2]>,
@@ -131,11 +133,8 @@ impl<'a> Scene<'a> {
             albedo: Vec3::from_array(options.color.map(linear_from_srgb)),
             voxel_edges: options.voxel_edges,
             kernel: Kernel::new(),
-            offsets: match options.samples_per_pixel {
-                1 => vec![[0.5, 0.5]],
-                samples => (0..samples).map(sequence).collect(),
-            },
-            disk: (0..options.samples_per_pixel * TILE * TILE).map(|i| disk(sequence(i))).collect(),
+            offsets: (1..options.samples_per_pixel).map(sequence).collect(),
+            disk: (0..RAYS as u32 * TILE * TILE).map(|i| disk(sequence(i))).collect(),
             pyramid,
         }
     }
@@ -147,31 +146,60 @@ impl<'a> Scene<'a> {
         voxel * 1.5
     }
 
-    /// Takes the samples of one pixel.
-    pub(super) fn shade_pixel(&self, x: u32, y: u32) -> Pixel {
+    /// Takes the first sample of a pixel, in its middle, with all its rays to the sky and the light.
+    pub(super) fn first_sample(&self, x: u32, y: u32) -> Pixel {
         let mut pixel = Pixel::default();
-        #[expect(clippy::cast_precision_loss, reason = "at most 64 samples")]
-        let share = 1.0 / self.offsets.len() as f32;
         let tile = TILE_ORDER[(y % TILE) as usize][(x % TILE) as usize];
-        for (sample, [dx, dy]) in self.offsets.iter().enumerate() {
-            let (origin, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy);
-            // Neighbouring pixels take turns, so that any few of them have rays for any sample.
-            let turn = (sample + tile).is_multiple_of(SAMPLES_PER_RAY);
-            let ray = turn.then(|| self.disk[sample * TILE_ORDER.as_flattened().len() + tile]);
-            if let Some(hit) = self.pyramid.march(origin / self.voxel, direction / self.voxel, f64::INFINITY) {
-                self.shade_object(&mut pixel, share, origin, direction, &hit, ray);
-            } else if let Some(point) = self.ground_point(origin, direction) {
-                pixel.ground.coverage += share;
-                if let Some(ray) = ray {
-                    let (sky, key) = self.ground_visibility(point, ray);
-                    pixel.ground.add(sky, key);
-                }
-            }
-        }
+        let rays = std::array::from_fn(|i| self.disk[i * TILE_ORDER.as_flattened().len() + tile]);
+        self.sample(&mut pixel, [f64::from(x) + 0.5, f64::from(y) + 0.5], 1.0, Some(rays));
         pixel
     }
 
-    fn shade_object(&self, pixel: &mut Pixel, share: f32, origin: DVec3, direction: DVec3, hit: &Hit, ray: Option<[f64; 2]>) {
+    /// Takes the other samples of a pixel.
+    pub(super) fn more_samples(&self, pixel: &mut Pixel, x: u32, y: u32) {
+        #[expect(clippy::cast_precision_loss, reason = "at most 64 samples")]
+        let share = 1.0 / (self.offsets.len() + 1) as f32;
+        pixel.sky *= share;
+        pixel.key *= share;
+        pixel.object.coverage *= share;
+        pixel.ground.coverage *= share;
+        for [dx, dy] in &self.offsets {
+            self.sample(pixel, [f64::from(x) + dx, f64::from(y) + dy], share, None);
+        }
+    }
+
+    /// Whether one sample is not enough: neighbours show other things.
+    pub(super) fn needs_more(&self, pixel: &Pixel, neighbour: &Pixel) -> bool {
+        let object = pixel.object.coverage > 0.0;
+        if object != (neighbour.object.coverage > 0.0) {
+            return true;
+        }
+        let apart = (neighbour.position - pixel.position).dot(pixel.normal).abs();
+        object && (pixel.detail || pixel.normal.dot(neighbour.normal) < 0.99 || apart > self.plane_tolerance())
+    }
+
+    fn sample(&self, pixel: &mut Pixel, [x, y]: [f64; 2], share: f32, rays: Option<[[f64; 2]; RAYS]>) {
+        let (origin, direction) = self.camera.ray(x, y);
+        if let Some(hit) = self.pyramid.march(origin / self.voxel, direction / self.voxel, f64::INFINITY) {
+            self.shade_object(pixel, share, origin, direction, &hit, rays);
+        } else if let Some(point) = self.ground_point(origin, direction) {
+            pixel.ground.coverage += share;
+            for ray in rays.into_iter().flatten() {
+                let (sky, key) = self.ground_visibility(point, ray);
+                pixel.ground.add(sky, key);
+            }
+        }
+    }
+
+    fn shade_object(
+        &self,
+        pixel: &mut Pixel,
+        share: f32,
+        origin: DVec3,
+        direction: DVec3,
+        hit: &Hit,
+        rays: Option<[[f64; 2]; RAYS]>,
+    ) {
         let position = origin + hit.t * direction;
         let mut face = DVec3::ZERO;
         face[hit.axis] = -direction[hit.axis].signum();
@@ -191,12 +219,13 @@ impl<'a> Scene<'a> {
 
         let lit = normal.dot(self.key);
         pixel.object.coverage += share;
-        if let Some(ray) = ray {
+        for ray in rays.into_iter().flatten() {
             let key = if lit > 0.0 { self.key_visibility(start, ray) } else { 0.0 };
             pixel.object.add(self.sky_visibility(start, normal, ray), key);
         }
 
         let edge = if self.voxel_edges { self.edge_shade(position, hit.axis, width) } else { 1.0 };
+        pixel.detail |= edge < 1.0;
         let n = normal.as_vec3();
         let up = n.dot(self.frame.up.as_vec3());
         let fill = n.dot(from_frame(self.frame, FILL_DIRECTION.as_dvec3()).as_vec3()).max(0.0);
