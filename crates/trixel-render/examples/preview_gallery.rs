@@ -34,7 +34,8 @@ const SHAPES: [(&str, Shape); 7] = [
     ("sheet", |[x, y, z], h| (z - 0.3 * (3.0 * x).sin() * (3.0 * y).cos()).abs() < 1.5 * h),
     // Asymmetric on purpose: the letter F, its foot towards the front, with a ball on its left.
     ("letter", |[x, y, z], _| {
-        let f = y.abs() < 0.15 && ((-0.4..-0.1).contains(&x) || (-0.1..0.5).contains(&x) && (z > 0.65 || (0.0..0.3).contains(&z)));
+        let f = y.abs() < 0.15
+            && ((-0.4..-0.1).contains(&x) || (-0.1..0.5).contains(&x) && (z > 0.65 || (0.0..0.3).contains(&z)));
         let ball = (x + 0.75).powi(2) + y * y + (z + 0.8).powi(2) < 0.03;
         (f && z.abs() < 0.95) || ball || (z < -0.8 && x.abs() < 0.3 && (-0.6..0.0).contains(&y))
     }),

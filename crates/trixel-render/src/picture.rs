@@ -121,8 +121,7 @@ mod tests {
             let mut reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().unwrap();
             let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
             reader.next_frame(&mut bytes).unwrap();
-            let expected: Vec<u8> =
-                picture.rgba.chunks_exact(4).flat_map(|p| p[..channels].iter().copied()).collect();
+            let expected: Vec<u8> = picture.rgba.chunks_exact(4).flat_map(|p| p[..channels].iter().copied()).collect();
             assert_eq!(bytes, expected);
         }
     }

@@ -68,7 +68,7 @@ impl Default for PreviewOptions {
             field_of_view: 24.0,
             background: Background::Backdrop([240, 240, 238]),
             ground: true,
-            color: [112, 146, 184],
+            color: [110, 140, 172],
             voxel_edges: true,
         }
     }

@@ -18,21 +18,21 @@ pub(super) const TILE: u32 = 4;
 /// Share of the picture's half size that stays free around the object.
 const MARGIN: f64 = 0.12;
 /// Most cells whose corners the camera is fitted to.
-const FIT_CELLS: u64 = 1 << 18;
+const FIT_CELLS: u64 = 1 << 21;
 /// Direction of the key light in the camera's frame: from the left, the front and above.
-const KEY_DIRECTION: DVec3 = DVec3::new(-0.50, -0.42, 0.90);
+const KEY_DIRECTION: DVec3 = DVec3::new(-0.48, -0.34, 0.92);
 /// Tangent of the key light's half width, which makes its shadows soft.
 const KEY_SPREAD: f64 = 0.10;
-const KEY_COLOR: Vec3 = Vec3::new(1.32, 1.25, 1.14);
-const SKY_COLOR: Vec3 = Vec3::new(0.50, 0.55, 0.63);
-const GROUND_BOUNCE: Vec3 = Vec3::new(0.40, 0.37, 0.35);
+const KEY_COLOR: Vec3 = Vec3::new(1.62, 1.50, 1.32);
+const SKY_COLOR: Vec3 = Vec3::new(0.44, 0.50, 0.60);
+const GROUND_BOUNCE: Vec3 = Vec3::new(0.34, 0.31, 0.29);
 /// A second light from the right, too weak to need shadows.
 const FILL_DIRECTION: Vec3 = Vec3::new(0.85, -0.45, 0.30);
 const FILL_COLOR: Vec3 = Vec3::new(0.10, 0.12, 0.15);
 /// Rays to the sky, and as many to the key light, that the first sample of a pixel sends.
 const RAYS: usize = 2;
 /// How far rays to the sky look, as a share of the object's longest side.
-const SKY_REACH: f64 = 0.45;
+const SKY_REACH: f64 = 0.6;
 /// Voxels narrower than the first number of pixels are shaded by the smoothed normal, above the second by their faces.
 const SMOOTH_PIXELS: [f64; 2] = [2.0, 6.0];
 /// Edges appear between these widths of a voxel in pixels.
@@ -111,7 +111,7 @@ impl<'a> Scene<'a> {
         let (low, high) = (place(lo), place(hi));
 
         let mut points = Vec::new();
-        pyramid.visit_cells(FIT_CELLS, |lo, hi| {
+        pyramid.visit_outer_cells(FIT_CELLS, |lo, hi| {
             let ends = [place(lo), place(hi)];
             points.extend((0..8_usize).map(|i| DVec3::new(ends[i & 1].x, ends[i >> 1 & 1].y, ends[i >> 2].z)));
         });
@@ -134,7 +134,7 @@ impl<'a> Scene<'a> {
             voxel_edges: options.voxel_edges,
             kernel: Kernel::new(),
             offsets: (1..options.samples_per_pixel).map(sequence).collect(),
-            disk: (0..RAYS as u32 * TILE * TILE).map(|i| disk(sequence(i))).collect(),
+            disk: (0..).map(|i| disk(sequence(i))).take(RAYS * TILE_ORDER.as_flattened().len()).collect(),
             pyramid,
         }
     }
@@ -258,7 +258,8 @@ impl<'a> Scene<'a> {
         // `rim` is in pixels from here on.
         let line = (0.018 * width).clamp(0.7, 2.5);
         let bevel = (0.07 * width).clamp(1.0, 12.0);
-        let dark = 0.26 * (1.0 - smoothstep([line * 0.5, line * 1.5], rim)) + 0.10 * (1.0 - smoothstep([0.0, bevel], rim));
+        let dark =
+            0.26 * (1.0 - smoothstep([line * 0.5, line * 1.5], rim)) + 0.10 * (1.0 - smoothstep([0.0, bevel], rim));
         #[expect(clippy::cast_possible_truncation, reason = "between 0 and 1")]
         let shade = (1.0 - strength * dark) as f32;
         shade
@@ -300,7 +301,7 @@ impl<'a> Scene<'a> {
         let direction = x * tangent + y * bitangent + (1.0 - x * x - y * y).max(1e-3).sqrt() * normal;
         match self.pyramid.march(start / self.voxel, direction / self.voxel, self.reach) {
             #[expect(clippy::cast_possible_truncation, reason = "between 0 and 1")]
-            Some(hit) => 0.75 * (hit.t / self.reach).sqrt() as f32,
+            Some(hit) => (hit.t / self.reach).sqrt() as f32,
             None => 1.0,
         }
     }
@@ -369,7 +370,8 @@ impl Kernel {
         for (dx, wx) in (-Self::RADIUS..).zip(Self::WEIGHTS) {
             for (dy, wy) in (-Self::RADIUS..).zip(Self::WEIGHTS) {
                 let corner = [front[0] + dx, front[1] + dy, front[2] - Self::RADIUS];
-                let [weight, moment] = self.along_z[pyramid.run_along_z(corner, Self::WIDTH as u32) as usize];
+                let [weight, moment] =
+                    self.along_z[pyramid.run_along_z(corner, 2 * Self::RADIUS.unsigned_abs() + 1) as usize];
                 sum -= wx * wy * Vec3::new(dx as f32 * weight, dy as f32 * weight, moment);
             }
         }

@@ -61,7 +61,9 @@ pub enum SceneError {
         name: String,
     },
     /// The parameter is not a positive integer.
-    #[error("scene:{name}:{parameter}: '{parameter}' is not a positive whole number; N is the {meaning}, {min} to {max}")]
+    #[error(
+        "scene:{name}:{parameter}: '{parameter}' is not a positive whole number; N is the {meaning}, {min} to {max}"
+    )]
     NotANumber {
         /// The scene.
         name: &'static str,

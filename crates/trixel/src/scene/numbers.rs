@@ -81,9 +81,7 @@ impl Random {
 
     /// A number in `0..below`.
     pub(super) fn below(&mut self, below: u32) -> u32 {
-        #[expect(clippy::cast_possible_truncation, reason = "below 2^32")]
-        let number = ((self.next() >> 32) * u64::from(below) >> 32) as u32;
-        number
+        (((self.next() >> 32) * u64::from(below)) >> 32) as u32
     }
 
     /// A number in `low..high`.
@@ -114,7 +112,10 @@ mod tests {
             let (s, c) = (turns * std::f64::consts::TAU).sin_cos();
             assert!((sin - s).abs() < 4e-15 && (cos - c).abs() < 4e-15, "{turns}: {sin} {s} {cos} {c}");
         }
-        assert_eq!([0.0, 0.25, 0.5, 0.75, 1.0].map(sin_cos), [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (0.0, 1.0)]);
+        assert_eq!(
+            [0.0, 0.25, 0.5, 0.75, 1.0].map(sin_cos),
+            [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (0.0, 1.0)]
+        );
     }
 
     #[test]

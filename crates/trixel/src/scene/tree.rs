@@ -39,8 +39,7 @@ fn fill(builder: &mut Builder, n: u32) {
     builder.material("bark", [0.105, 0.058, 0.030], 0.95);
     builder.material("leaf", [0.110, 0.280, 0.045], 0.7);
     let mut random = Random(0x7ee);
-    let trunk =
-        Branch { from: [0.0; 3], direction: [0.0, 0.0, 1.0], length: 1.9, radius: 0.17, partings: n - 1 };
+    let trunk = Branch { from: [0.0; 3], direction: [0.0, 0.0, 1.0], length: 1.9, radius: 0.17, partings: n - 1 };
     grow(builder, &mut random, &trunk);
 }
 
@@ -76,8 +75,7 @@ fn grow(builder: &mut Builder, random: &mut Random, branch: &Branch) {
         let leaning = rotation(axis, lean).map(|row| dot(row, branch.direction));
         let direction = normalize(add(leaning, [0.0, 0.0, 0.10]));
         let length = branch.length * random.between(0.64, 0.76);
-        let grown =
-            Branch { from: at(t), direction, length, radius: radius(t) * 0.72, partings: branch.partings - 1 };
+        let grown = Branch { from: at(t), direction, length, radius: radius(t) * 0.72, partings: branch.partings - 1 };
         grow(builder, random, &grown);
     }
 }

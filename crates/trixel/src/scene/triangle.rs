@@ -20,8 +20,7 @@ fn fill(builder: &mut Builder, n: u32) {
     for i in 0..n {
         let share = f64::from(i) / f64::from(n);
         let rows = rotation(axis, share);
-        let vertices =
-            corners.map(|corner| builder.vertex(scale(rows.map(|row| dot(row, corner)), 1.0 - 0.5 * share)));
+        let vertices = corners.map(|corner| builder.vertex(scale(rows.map(|row| dot(row, corner)), 1.0 - 0.5 * share)));
         builder.triangle(vertices);
     }
 }
