@@ -95,7 +95,6 @@ pub(super) fn resolve(band: &Band<'_>, backdrop: &Backdrop, tolerance: f32, x: u
     let shadow = pixel.ground.coverage * (GROUND_SKY * (1.0 - ground_sky) + GROUND_KEY * (1.0 - ground_key));
 
     let (color, alpha) = match backdrop.at(x, y) {
-        // Interpolation noise is below one step of 8 bits, but a gradient this flat needs no dither to look smooth.
         Some(behind) => (color + behind * (1.0 - covered - shadow).max(0.0), 1.0),
         None => {
             let alpha = (covered + shadow).min(1.0);

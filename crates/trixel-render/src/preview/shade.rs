@@ -41,7 +41,7 @@ const EDGE_PIXELS: [f64; 2] = [5.0, 14.0];
 /// What the samples of one pixel found, before light and sky are averaged over neighbours.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Pixel {
-    /// Light that the object reflects of the sky, were it all visible (linear, summed over covered samples / all).
+    /// Light that the object reflects of the sky, were it all visible (linear, averaged over all samples).
     pub sky: Vec3,
     /// The same of the key light.
     pub key: Vec3,
