@@ -122,7 +122,7 @@ impl Camera {
         if self.orthographic { self.pixel } else { self.pixel * t }
     }
 
-    /// The height of the camera along `up`; an orthographic one's is that of a point on its central ray.
+    /// Where the camera is; for an orthographic one, a point on its central ray.
     pub(super) fn origin(&self) -> DVec3 {
         self.origin
     }

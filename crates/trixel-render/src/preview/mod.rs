@@ -68,7 +68,7 @@ impl Default for PreviewOptions {
             field_of_view: 24.0,
             background: Background::Backdrop([240, 240, 238]),
             ground: true,
-            color: [112, 146, 184],
+            color: [110, 140, 172],
             voxel_edges: true,
         }
     }
@@ -154,9 +154,14 @@ pub fn render_preview(volume: &Volume, options: &PreviewOptions) -> Result<Pictu
         if let Some(scene) = &scene {
             pixels.par_chunks_mut(width as usize).zip(first..last).for_each(|(row, y)| {
                 for (pixel, x) in row.iter_mut().zip(0..width) {
-                    *pixel = scene.shade_pixel(x, y);
+                    *pixel = scene.first_sample(x, y);
                 }
             });
+            if options.samples_per_pixel > 1 {
+                let refined = refine(scene, &resolve::Band { pixels: &pixels, width, first, last }, top..bottom);
+                let start = (top - first) as usize * width as usize;
+                pixels[start..start + refined.len()].copy_from_slice(&refined);
+            }
         }
         let band = resolve::Band { pixels: &pixels, width, first, last };
         let tolerance = scene.as_ref().map_or(0.0, shade::Scene::plane_tolerance);
@@ -168,6 +173,21 @@ pub fn render_preview(volume: &Volume, options: &PreviewOptions) -> Result<Pictu
         });
     }
     Ok(Picture { width, height, rgba })
+}
+
+/// Rows `rows` of a band, with all samples in the pixels where one is not enough.
+fn refine(scene: &shade::Scene<'_>, band: &resolve::Band<'_>, rows: std::ops::Range<u32>) -> Vec<shade::Pixel> {
+    let row = |y: u32| {
+        (0..band.width).map(move |x| {
+            let mut pixel = *band.at(x, y);
+            let differs = |&(nx, ny): &(u32, u32)| scene.needs_more(&pixel, band.at(nx, ny));
+            if band.around(x, y, 1, 1).any(|neighbour| differs(&neighbour)) {
+                scene.more_samples(&mut pixel, x, y);
+            }
+            pixel
+        })
+    };
+    rows.into_par_iter().flat_map_iter(row).collect()
 }
 
 #[cfg(test)]

@@ -30,6 +30,8 @@ pub(super) struct Pyramid<'a> {
     coarse: Vec<u64>,
     levels: [Level; MAX_LEVELS],
     top: usize,
+    /// What a voxel's coordinates are shifted by at the top.
+    top_shift: u32,
     dims: [i32; 3],
     lo: [i32; 3],
     hi: [i32; 3],
@@ -53,18 +55,19 @@ impl<'a> Pyramid<'a> {
         let mut size = volume.grid().dims().map(|d| d as usize);
         let mut levels = [Level::default(); MAX_LEVELS];
         levels[0] = Level { start: 0, rows: size[1], column_words: volume.column_words() };
-        let (mut coarse, mut top) = (Vec::new(), 0);
+        let (mut coarse, mut top, mut top_shift) = (Vec::new(), 0, 0);
         while size.iter().any(|&s| s > 1 << LEVEL_SHIFT) && top + 1 < MAX_LEVELS {
             let smaller = size.map(|s| s.div_ceil(1 << LEVEL_SHIFT));
             let below = levels[top];
             let words = coarsen(if top == 0 { volume.words() } else { &coarse[below.start..] }, below, size, smaller);
             let column_words = smaller[2].div_ceil(WORD_BITS as usize);
             top += 1;
+            top_shift += LEVEL_SHIFT;
             levels[top] = Level { start: coarse.len(), rows: smaller[1], column_words };
             coarse.extend(words);
             size = smaller;
         }
-        Some(Self { fine: volume.words(), coarse, levels, top, dims, lo, hi })
+        Some(Self { fine: volume.words(), coarse, levels, top, top_shift, dims, lo, hi })
     }
 
     /// The lowest voxel, and one past the highest, of the smallest box around all set voxels.
@@ -73,8 +76,8 @@ impl<'a> Pyramid<'a> {
     }
 
     /// Whether a voxel is set; none is outside the grid.
-    #[inline]
-    pub(super) fn get(&self, voxel: [i32; 3]) -> bool {
+    #[cfg(test)]
+    fn get(&self, voxel: [i32; 3]) -> bool {
         let inside = (0..3).all(|i| voxel[i] >= 0 && voxel[i] < self.dims[i]);
         inside && self.occupied(0, voxel)
     }
@@ -100,8 +103,9 @@ impl<'a> Pyramid<'a> {
         run
     }
 
-    /// Calls `visit` with the box (in voxels) of each occupied cell of the finest level that has at most `most` cells.
-    pub(super) fn visit_cells(&self, most: u64, mut visit: impl FnMut([i32; 3], [i32; 3])) {
+    /// Calls `visit` with the boxes (in voxels) of the lowest and highest occupied cell of each column of the finest level
+    /// that has at most `most` cells: together they have the extent of all set voxels in every direction.
+    pub(super) fn visit_outer_cells(&self, most: u64, mut visit: impl FnMut([i32; 3], [i32; 3])) {
         let cells = |level: usize| -> [i32; 3] {
             let shift = LEVEL_SHIFT * u32::try_from(level).unwrap_or(0);
             self.dims.map(|d| ((d - 1) >> shift) + 1)
@@ -112,13 +116,16 @@ impl<'a> Pyramid<'a> {
         let [nx, ny, nz] = cells(level);
         for x in 0..nx {
             for y in 0..ny {
-                for z in 0..nz {
+                let mut visit = |z: i32| {
                     let cell = [x, y, z];
-                    if self.occupied(level, cell) {
-                        let lo = std::array::from_fn(|i| (cell[i] * edge).max(self.lo[i]));
-                        let hi = std::array::from_fn(|i| ((cell[i] + 1) * edge).min(self.hi[i]));
-                        visit(lo, hi);
-                    }
+                    let lo = std::array::from_fn(|i| (cell[i] * edge).max(self.lo[i]));
+                    let hi = std::array::from_fn(|i| ((cell[i] + 1) * edge).min(self.hi[i]));
+                    visit(lo, hi);
+                };
+                let occupied = |z: &i32| self.occupied(level, [x, y, *z]);
+                if let Some(lowest) = (0..nz).find(occupied) {
+                    visit(lowest);
+                    (lowest + 1..nz).rev().find(occupied).into_iter().for_each(visit);
                 }
             }
         }
@@ -152,8 +159,7 @@ impl<'a> Pyramid<'a> {
             far = far.min(a.max(b));
         }
         let mut t = near.max(0.0);
-        // Written so that a NaN ends the walk.
-        if !(t < far) {
+        if t.is_nan() || t >= far {
             return None;
         }
         let forward = d.map(|c| c > 0.0);
@@ -164,7 +170,7 @@ impl<'a> Pyramid<'a> {
 
         // From here on `cell` counts cells of `level`, and `exits` are its far sides.
         let mut level = self.top;
-        let mut shift = LEVEL_SHIFT * level as u32;
+        let mut shift = self.top_shift;
         let mut cell: [i32; 3] = std::array::from_fn(|i| {
             let entered = i == axis && near > 0.0;
             let edge = if forward[i] { self.lo[i] } else { self.hi[i] - 1 };
@@ -199,8 +205,7 @@ impl<'a> Pyramid<'a> {
                     2
                 };
                 t = exits[axis];
-                // Written so that a NaN ends the walk.
-                if !(t < far) {
+                if t.is_nan() || t >= far {
                     return None;
                 }
                 let before = cell[axis];
@@ -321,6 +326,7 @@ mod tests {
         let mut volume = Volume::new(Grid::new([0.0; 3], [1.0; 3], dims).unwrap()).unwrap();
         let mut next = random(seed);
         for _ in 0..voxels {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the dimensions")]
             volume.set(dims.map(|d| (next() * f64::from(d)) as u32));
         }
         volume
@@ -405,7 +411,7 @@ mod tests {
         let pyramid = Pyramid::build(&volume).unwrap();
         assert_eq!(pyramid.occupied_box(), ([3, 2, 65], [61, 31, 191]));
         let mut cells = Vec::new();
-        pyramid.visit_cells(1, |lo, hi| cells.push((lo, hi)));
+        pyramid.visit_outer_cells(1, |lo, hi| cells.push((lo, hi)));
         assert!(
             cells.iter().any(|(lo, _)| lo[0] == 3) && cells.iter().any(|(_, hi)| *hi == [61, 31, 191]),
             "{cells:?}"

@@ -31,8 +31,16 @@ pub(super) struct Band<'a> {
 }
 
 impl Band<'_> {
-    fn at(&self, x: u32, y: u32) -> &Pixel {
+    /// The pixel at column `x` of row `y`.
+    pub(super) fn at(&self, x: u32, y: u32) -> &Pixel {
         &self.pixels[(y - self.first) as usize * self.width as usize + x as usize]
+    }
+
+    /// The positions from `before` to `after` pixels around one, itself included, as far as they are in the band.
+    pub(super) fn around(&self, x: u32, y: u32, before: u32, after: u32) -> impl Iterator<Item = (u32, u32)> + use<> {
+        let columns = x.saturating_sub(before)..(x + after + 1).min(self.width);
+        let rows = y.saturating_sub(before).max(self.first)..(y + after + 1).min(self.last);
+        rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
     }
 }
 
@@ -70,16 +78,14 @@ pub(super) fn resolve(band: &Band<'_>, backdrop: &Backdrop, tolerance: f32, x: u
     let pixel = band.at(x, y);
     let mut object = Visibility::default();
     let mut ground = Visibility::default();
-    let columns = x.saturating_sub(BEFORE)..(x + AFTER + 1).min(band.width);
-    for ny in y.saturating_sub(BEFORE)..(y + AFTER + 1).min(band.last) {
-        for nx in columns.clone() {
-            let other = band.at(nx, ny);
-            if pixel.ground.coverage > 0.0 {
-                accumulate(&mut ground, &other.ground, 1.0);
-            }
-            if pixel.object.coverage > 0.0 && other.object.coverage > 0.0 {
-                accumulate(&mut object, &other.object, same_surface(pixel, other, tolerance));
-            }
+    for (nx, ny) in band.around(x, y, BEFORE, AFTER) {
+        let other = band.at(nx, ny);
+        if pixel.ground.coverage > 0.0 {
+            accumulate(&mut ground, &other.ground, 1.0);
+        }
+        if pixel.object.coverage > 0.0 && other.object.rays > 0.0 {
+            // Next to nothing rather than nothing, for pixels that sent no rays and have no like.
+            accumulate(&mut object, &other.object, same_surface(pixel, other, tolerance).max(1e-4));
         }
     }
     let (object_sky, object_key) = mean(&object);
@@ -89,7 +95,6 @@ pub(super) fn resolve(band: &Band<'_>, backdrop: &Backdrop, tolerance: f32, x: u
     let shadow = pixel.ground.coverage * (GROUND_SKY * (1.0 - ground_sky) + GROUND_KEY * (1.0 - ground_key));
 
     let (color, alpha) = match backdrop.at(x, y) {
-        // Interpolation noise is below one step of 8 bits, but a gradient this flat needs no dither to look smooth.
         Some(behind) => (color + behind * (1.0 - covered - shadow).max(0.0), 1.0),
         None => {
             let alpha = (covered + shadow).min(1.0);

@@ -18,21 +18,21 @@ pub(super) const TILE: u32 = 4;
 /// Share of the picture's half size that stays free around the object.
 const MARGIN: f64 = 0.12;
 /// Most cells whose corners the camera is fitted to.
-const FIT_CELLS: u64 = 1 << 18;
+const FIT_CELLS: u64 = 1 << 21;
 /// Direction of the key light in the camera's frame: from the left, the front and above.
-const KEY_DIRECTION: DVec3 = DVec3::new(-0.50, -0.42, 0.90);
+const KEY_DIRECTION: DVec3 = DVec3::new(-0.48, -0.34, 0.92);
 /// Tangent of the key light's half width, which makes its shadows soft.
 const KEY_SPREAD: f64 = 0.10;
-const KEY_COLOR: Vec3 = Vec3::new(1.32, 1.25, 1.14);
-const SKY_COLOR: Vec3 = Vec3::new(0.50, 0.55, 0.63);
-const GROUND_BOUNCE: Vec3 = Vec3::new(0.40, 0.37, 0.35);
+const KEY_COLOR: Vec3 = Vec3::new(1.62, 1.50, 1.32);
+const SKY_COLOR: Vec3 = Vec3::new(0.44, 0.50, 0.60);
+const GROUND_BOUNCE: Vec3 = Vec3::new(0.34, 0.31, 0.29);
 /// A second light from the right, too weak to need shadows.
 const FILL_DIRECTION: Vec3 = Vec3::new(0.85, -0.45, 0.30);
 const FILL_COLOR: Vec3 = Vec3::new(0.10, 0.12, 0.15);
-/// One of so many samples sends a ray to the sky and one to the key light.
-const SAMPLES_PER_RAY: usize = 2;
+/// Rays to the sky, and as many to the key light, that the first sample of a pixel sends.
+const RAYS: usize = 2;
 /// How far rays to the sky look, as a share of the object's longest side.
-const SKY_REACH: f64 = 0.45;
+const SKY_REACH: f64 = 0.6;
 /// Voxels narrower than the first number of pixels are shaded by the smoothed normal, above the second by their faces.
 const SMOOTH_PIXELS: [f64; 2] = [2.0, 6.0];
 /// Edges appear between these widths of a voxel in pixels.
@@ -41,7 +41,7 @@ const EDGE_PIXELS: [f64; 2] = [5.0, 14.0];
 /// What the samples of one pixel found, before light and sky are averaged over neighbours.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Pixel {
-    /// Light that the object reflects of the sky, were it all visible (linear, summed over covered samples / all).
+    /// Light that the object reflects of the sky, were it all visible (linear, averaged over all samples).
     pub sky: Vec3,
     /// The same of the key light.
     pub key: Vec3,
@@ -49,6 +49,8 @@ pub(super) struct Pixel {
     pub position: Vec3,
     /// The normal there.
     pub normal: Vec3,
+    /// Whether the edge of a voxel is drawn close by.
+    pub detail: bool,
     /// Samples on the object.
     pub object: Visibility,
     /// Samples on the ground.
@@ -60,7 +62,7 @@ pub(super) struct Pixel {
 pub(super) struct Visibility {
     /// Share of the pixel's samples that see this kind of surface.
     pub coverage: f32,
-    /// How many of them sent rays to the sky and the key light.
+    /// Rays that were sent to the sky, and as many to the key light.
     pub rays: f32,
     /// Sum of the visible share of the sky over these.
     pub sky: f32,
@@ -93,7 +95,7 @@ pub(super) struct Scene<'a> {
     albedo: Vec3,
     voxel_edges: bool,
     kernel: Kernel,
-    /// Offsets of the samples within a pixel.
+    /// Offsets within a pixel of the samples after the first, which is in the middle.
     offsets: Vec<[f64; 2]>,
     /// Points of the unit disk that light and sky rays go through.
     disk: Vec<[f64; 2]>,
@@ -109,7 +111,7 @@ impl<'a> Scene<'a> {
         let (low, high) = (place(lo), place(hi));
 
         let mut points = Vec::new();
-        pyramid.visit_cells(FIT_CELLS, |lo, hi| {
+        pyramid.visit_outer_cells(FIT_CELLS, |lo, hi| {
             let ends = [place(lo), place(hi)];
             points.extend((0..8_usize).map(|i| DVec3::new(ends[i & 1].x, ends[i >> 1 & 1].y, ends[i >> 2].z)));
         });
@@ -131,11 +133,8 @@ impl<'a> Scene<'a> {
             albedo: Vec3::from_array(options.color.map(linear_from_srgb)),
             voxel_edges: options.voxel_edges,
             kernel: Kernel::new(),
-            offsets: match options.samples_per_pixel {
-                1 => vec![[0.5, 0.5]],
-                samples => (0..samples).map(sequence).collect(),
-            },
-            disk: (0..options.samples_per_pixel * TILE * TILE).map(|i| disk(sequence(i))).collect(),
+            offsets: (1..options.samples_per_pixel).map(sequence).collect(),
+            disk: (0..).map(|i| disk(sequence(i))).take(RAYS * TILE_ORDER.as_flattened().len()).collect(),
             pyramid,
         }
     }
@@ -147,28 +146,49 @@ impl<'a> Scene<'a> {
         voxel * 1.5
     }
 
-    /// Takes the samples of one pixel.
-    pub(super) fn shade_pixel(&self, x: u32, y: u32) -> Pixel {
+    /// Takes the first sample of a pixel, in its middle, with all its rays to the sky and the light.
+    pub(super) fn first_sample(&self, x: u32, y: u32) -> Pixel {
         let mut pixel = Pixel::default();
-        #[expect(clippy::cast_precision_loss, reason = "at most 64 samples")]
-        let share = 1.0 / self.offsets.len() as f32;
         let tile = TILE_ORDER[(y % TILE) as usize][(x % TILE) as usize];
-        for (sample, [dx, dy]) in self.offsets.iter().enumerate() {
-            let (origin, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy);
-            // Neighbouring pixels take turns, so that any few of them have rays for any sample.
-            let turn = (sample + tile).is_multiple_of(SAMPLES_PER_RAY);
-            let ray = turn.then(|| self.disk[sample * TILE_ORDER.as_flattened().len() + tile]);
-            if let Some(hit) = self.pyramid.march(origin / self.voxel, direction / self.voxel, f64::INFINITY) {
-                self.shade_object(&mut pixel, share, origin, direction, &hit, ray);
-            } else if let Some(point) = self.ground_point(origin, direction) {
-                pixel.ground.coverage += share;
-                if let Some(ray) = ray {
-                    let (sky, key) = self.ground_visibility(point, ray);
-                    pixel.ground.add(sky, key);
-                }
+        let rays = std::array::from_fn(|i| self.disk[i * TILE_ORDER.as_flattened().len() + tile]);
+        self.sample(&mut pixel, [f64::from(x) + 0.5, f64::from(y) + 0.5], 1.0, Some(rays));
+        pixel
+    }
+
+    /// Takes the other samples of a pixel.
+    pub(super) fn more_samples(&self, pixel: &mut Pixel, x: u32, y: u32) {
+        #[expect(clippy::cast_precision_loss, reason = "at most 64 samples")]
+        let share = 1.0 / (self.offsets.len() + 1) as f32;
+        pixel.sky *= share;
+        pixel.key *= share;
+        pixel.object.coverage *= share;
+        pixel.ground.coverage *= share;
+        for [dx, dy] in &self.offsets {
+            self.sample(pixel, [f64::from(x) + dx, f64::from(y) + dy], share, None);
+        }
+    }
+
+    /// Whether one sample is not enough: neighbours show other things.
+    pub(super) fn needs_more(&self, pixel: &Pixel, neighbour: &Pixel) -> bool {
+        let object = pixel.object.coverage > 0.0;
+        if object != (neighbour.object.coverage > 0.0) {
+            return true;
+        }
+        let apart = (neighbour.position - pixel.position).dot(pixel.normal).abs();
+        object && (pixel.detail || pixel.normal.dot(neighbour.normal) < 0.99 || apart > self.plane_tolerance())
+    }
+
+    fn sample(&self, pixel: &mut Pixel, [x, y]: [f64; 2], share: f32, rays: Option<[[f64; 2]; RAYS]>) {
+        let (origin, direction) = self.camera.ray(x, y);
+        if let Some(hit) = self.pyramid.march(origin / self.voxel, direction / self.voxel, f64::INFINITY) {
+            self.shade_object(pixel, share, origin, direction, &hit, rays);
+        } else if let Some(point) = self.ground_point(origin, direction) {
+            pixel.ground.coverage += share;
+            for ray in rays.into_iter().flatten() {
+                let (sky, key) = self.ground_visibility(point, ray);
+                pixel.ground.add(sky, key);
             }
         }
-        pixel
     }
 
     fn shade_object(
@@ -178,7 +198,7 @@ impl<'a> Scene<'a> {
         origin: DVec3,
         direction: DVec3,
         hit: &Hit,
-        ray: Option<[f64; 2]>,
+        rays: Option<[[f64; 2]; RAYS]>,
     ) {
         let position = origin + hit.t * direction;
         let mut face = DVec3::ZERO;
@@ -199,12 +219,13 @@ impl<'a> Scene<'a> {
 
         let lit = normal.dot(self.key);
         pixel.object.coverage += share;
-        if let Some(ray) = ray {
+        for ray in rays.into_iter().flatten() {
             let key = if lit > 0.0 { self.key_visibility(start, ray) } else { 0.0 };
             pixel.object.add(self.sky_visibility(start, normal, ray), key);
         }
 
         let edge = if self.voxel_edges { self.edge_shade(position, hit.axis, width) } else { 1.0 };
+        pixel.detail |= edge < 1.0;
         let n = normal.as_vec3();
         let up = n.dot(self.frame.up.as_vec3());
         let fill = n.dot(from_frame(self.frame, FILL_DIRECTION.as_dvec3()).as_vec3()).max(0.0);
@@ -280,7 +301,7 @@ impl<'a> Scene<'a> {
         let direction = x * tangent + y * bitangent + (1.0 - x * x - y * y).max(1e-3).sqrt() * normal;
         match self.pyramid.march(start / self.voxel, direction / self.voxel, self.reach) {
             #[expect(clippy::cast_possible_truncation, reason = "between 0 and 1")]
-            Some(hit) => 0.75 * (hit.t / self.reach).sqrt() as f32,
+            Some(hit) => (hit.t / self.reach).sqrt() as f32,
             None => 1.0,
         }
     }
@@ -349,7 +370,8 @@ impl Kernel {
         for (dx, wx) in (-Self::RADIUS..).zip(Self::WEIGHTS) {
             for (dy, wy) in (-Self::RADIUS..).zip(Self::WEIGHTS) {
                 let corner = [front[0] + dx, front[1] + dy, front[2] - Self::RADIUS];
-                let [weight, moment] = self.along_z[pyramid.run_along_z(corner, Self::WIDTH as u32) as usize];
+                let [weight, moment] =
+                    self.along_z[pyramid.run_along_z(corner, 2 * Self::RADIUS.unsigned_abs() + 1) as usize];
                 sum -= wx * wy * Vec3::new(dx as f32 * weight, dy as f32 * weight, moment);
             }
         }

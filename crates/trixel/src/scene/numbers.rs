@@ -81,9 +81,7 @@ impl Random {
 
     /// A number in `0..below`.
     pub(super) fn below(&mut self, below: u32) -> u32 {
-        #[expect(clippy::cast_possible_truncation, reason = "below 2^32")]
-        let number = ((self.next() >> 32) * u64::from(below) >> 32) as u32;
-        number
+        (((self.next() >> 32) * u64::from(below)) >> 32) as u32
     }
 
     /// A number in `low..high`.
