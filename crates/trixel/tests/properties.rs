@@ -1,5 +1,7 @@
 //! What must hold for any mesh: invariances, inclusions, separation, and volumes that converge.
 
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
+
 use proptest::prelude::*;
 use trixel::conformance::suite::lattice_mesh;
 use trixel::conformance::zoo;
