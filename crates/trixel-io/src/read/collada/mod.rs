@@ -168,10 +168,7 @@ impl<'d> SceneReader<'d> {
             if element.name() != "controller" {
                 return self.place(element, Some(instance), &transform);
             }
-            target = element.children().find_map(|deformer| match deformer.name() {
-                "skin" | "morph" => Some(deformer),
-                _ => None,
-            });
+            target = element.children().find(|deformer| matches!(deformer.name(), "skin" | "morph"));
             if let Some(shape) = target.and_then(|deformer| deformer.child("bind_shape_matrix")) {
                 transform = transform.after(&node::matrix(shape)?);
             }
