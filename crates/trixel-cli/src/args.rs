@@ -27,6 +27,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Voxelize a mesh and write the voxels.
+    #[command(long_about = voxelize_about(), after_help = VOXELIZE_EXAMPLES, override_usage = VOXELIZE_USAGE)]
     Voxelize(Box<VoxelizeArgs>),
     /// Describe a mesh, a volume, or a built-in scene.
     Info(InfoArgs),
@@ -43,6 +44,17 @@ pub(crate) enum Command {
     },
 }
 
+const VOXELIZE_USAGE: &str = "trixel voxelize <INPUT> -o <OUT> [-o <OUT>...] [OPTIONS]";
+
+fn voxelize_about() -> String {
+    format!(
+        "Voxelize a mesh and write the voxels.\n\nINPUT is a mesh file (.obj, .stl, .ply, .off, .gltf, .glb, .3mf, .dae) \
+         or a built-in scene, `scene:NAME` or `scene:NAME:N`. The voxels go to every OUT, whose extension picks the \
+         format. Outputs appear whole or not at all.\n\nScenes, with what N is:\n{}",
+        crate::mesh::scene_list()
+    )
+}
+
 const VOXELIZE_EXAMPLES: &str = "\
 Examples:
   trixel voxelize scene:torus --resolution 128 -o torus.npz -o torus.png
@@ -53,14 +65,8 @@ Examples:
 Exit status: 0 done, 1 failed (one message on standard error says what, where, and what to do), 2 wrong usage.";
 
 #[derive(Debug, Args)]
-#[command(after_help = VOXELIZE_EXAMPLES, long_about = format!(
-    "Voxelize a mesh and write the voxels.\n\n\
-     INPUT is a mesh file (.obj, .stl, .ply, .off, .gltf, .glb, .3mf, .dae) or a built-in scene, `scene:NAME` or \
-     `scene:NAME:SIZE`. The voxels go to every OUT; its extension picks the format. Outputs appear whole or not at \
-     all.\n\nScenes:\n{}", crate::mesh::scene_list()
-))]
 pub(crate) struct VoxelizeArgs {
-    /// A mesh file, or scene:NAME[:SIZE].
+    /// A mesh file, or scene:NAME[:N].
     #[arg(value_name = "INPUT")]
     pub(crate) input: Option<String>,
 
@@ -165,7 +171,7 @@ fn parse_overlap(text: &str) -> Result<f64, String> {
 
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// A mesh file, a volume (.npz, .npy, .binvox, .vti, .nrrd, .raw), or scene:NAME[:SIZE].
+    /// A mesh file, a volume (.npz, .npy, .binvox, .vti, .nrrd, .raw), or scene:NAME[:N].
     #[arg(value_name = "FILE")]
     pub(crate) file: String,
 
@@ -180,7 +186,7 @@ pub(crate) struct VerifyArgs {
     #[arg(value_name = "VOLUME")]
     pub(crate) volume: PathBuf,
 
-    /// The mesh that it should be the voxels of, or scene:NAME[:SIZE].
+    /// The mesh that it should be the voxels of, or scene:NAME[:N].
     #[arg(value_name = "MESH")]
     pub(crate) mesh: String,
 

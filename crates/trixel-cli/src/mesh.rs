@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Result, anyhow};
-use trixel::{Mesh, UpAxis, scene};
+use trixel::scene::{self, Scene};
+use trixel::{Mesh, UpAxis};
 use trixel_io::read::{MeshFormat, ReadOptions, read_mesh};
 
 use crate::progress::Reporter;
@@ -26,8 +27,11 @@ pub(crate) fn up(input: &str, mesh: &Mesh) -> UpAxis {
     })
 }
 
-/// One line a scene, for `--help`.
+/// The scenes, two lines each, for `--help`.
 pub(crate) fn scene_list() -> String {
-    let lines = scene::SCENES.iter().map(|scene| format!("  {:14}{}", scene.name, scene.description));
-    lines.collect::<Vec<_>>().join("\n")
+    let line = |scene: &Scene| {
+        let Scene { name, description, parameter, default, .. } = scene;
+        format!("  {name:14}{description}\n  {:14}N: {parameter}; {default} by default", "")
+    };
+    scene::SCENES.iter().map(line).collect::<Vec<_>>().join("\n")
 }

@@ -10,10 +10,11 @@ use trixel_io::volume_read::read_volume;
 
 use crate::args::VerifyArgs;
 use crate::progress::Reporter;
-use crate::voxelize::{allocate, backend, job, set_threads, warn_if_open};
+use crate::voxelize::{allocate, backend, check_method, job, set_threads, warn_if_open};
 use crate::{memory, mesh};
 
 pub(crate) fn run(args: &VerifyArgs) -> Result<ExitCode> {
+    check_method(&args.method);
     set_threads(&args.method)?;
     let reporter = Reporter::new(false);
     let (loaded, _) = reporter.stage("reading the volume", || read_volume(&args.volume, memory::available()));

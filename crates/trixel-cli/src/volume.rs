@@ -2,14 +2,26 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use trixel::{Grid, UpAxis, Volume};
+use trixel_io::VolumeFormat;
 use trixel_io::atomic_file::{AtomicFile, Staged};
 use trixel_io::write::{WriteOptions, check_target, write_volume};
 use trixel_render::{PreviewOptions, render_preview};
 
 fn is_picture(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
+}
+
+/// Refuses an output that nothing here writes, before anything is read.
+pub(crate) fn check_extension(path: &Path) -> Result<()> {
+    let known = VolumeFormat::ALL.map(|format| format!(".{}", format.extension())).join(", ");
+    ensure!(
+        is_picture(path) || VolumeFormat::from_path(path).is_some(),
+        "{}: unknown volume format; trixel writes {known} and .png",
+        path.display()
+    );
+    Ok(())
 }
 
 /// Finds out before the work whether the output could be written after it.

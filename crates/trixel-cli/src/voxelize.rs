@@ -27,6 +27,8 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     if args.outputs.is_empty() && args.report.is_none() {
         usage("nothing to write: give -o OUT (for example -o voxels.npz) or --report FILE.json");
     }
+    check_method(&args.method);
+    args.outputs.iter().try_for_each(|output| volume::check_extension(output))?;
     check_paths(&input, &args.outputs, args.report.as_deref())?;
     set_threads(&args.method)?;
     let reporter = Reporter::new(args.quiet);
@@ -166,6 +168,13 @@ pub(crate) fn set_threads(method: &MethodArgs) -> Result<()> {
         pool.build_global().with_context(|| format!("cannot start {threads} threads; ask for fewer"))?;
     }
     Ok(())
+}
+
+/// Refuses what makes no sense together, before anything is read.
+pub(crate) fn check_method(method: &MethodArgs) {
+    if method.overlap != 0.0 && Mode::from(method.mode) != Mode::Sliced {
+        usage("--overlap only means something with --mode sliced");
+    }
 }
 
 /// The job that the arguments describe.

@@ -6,12 +6,12 @@ pub enum Mode {
     /// 26-separating surface: the closed voxel and the closed triangle share a point.
     #[default]
     Conservative,
-    /// 6-separating surface ([HCV] figure 6.2): the triangle passes the voxel's centre within half a voxel along the
+    /// 6-separating surface (\[HCV\] figure 6.2): the triangle passes the voxel's centre within half a voxel along the
     /// dominant axis of its plane and of each projected edge.
     Thin,
     /// Interior by parity: an odd number of triangles cross the ray from the voxel's centre towards -z.
     Solid,
-    /// [CL]'s one-pass slicing: the line along z through the voxel's centre meets a triangle inside the voxel's closed
+    /// The one-pass slicing of \[CL\]: the line along z through the voxel's centre meets a triangle inside the voxel's closed
     /// slice. Misses walls parallel to z.
     Sliced,
 }

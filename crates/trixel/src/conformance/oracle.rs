@@ -1,7 +1,7 @@
 //! The definition of each mode, once, as plain and obviously correct code in 128-bit integers, without factoring.
 //!
 //! Slow on purpose: it tests every voxel of a triangle's bounding box by itself. It shares no arithmetic with the
-//! backends: the conservative test is the full separating-axis test over 13 axes, not the edge functions of [HCV].
+//! backends: the conservative test is the full separating-axis test over 13 axes, not the edge functions of \[HCV\].
 
 use crate::job::Job;
 use crate::lattice::{LatticeMesh, STEPS_PER_VOXEL};

@@ -44,38 +44,26 @@ pub(super) fn fill<C: Into<i64> + Copy + Send + Sync>(mesh: Corners<'_, C>, volu
     });
 }
 
-/// The triangles of one slab: all, or those with the given indices.
-#[derive(Clone, Copy)]
-enum Selection<'a> {
-    All,
-    #[cfg(feature = "threads")]
-    Some(&'a [u32]),
-    #[cfg(not(feature = "threads"))]
-    Never(&'a std::convert::Infallible),
-}
-
+/// Runs the kernel over the triangles with the given indices, or over all.
 fn run_all<R: Rule, C: Into<i64> + Copy>(
     rule: &R,
     mesh: Corners<'_, C>,
-    selection: Selection<'_>,
+    selection: Option<&[u32]>,
     clip: &VoxelBox,
     sink: &mut impl Sink,
 ) {
     let mut scratch = Scratch::default();
     match selection {
-        Selection::All => {
+        None => {
             for &triangle in mesh.triangles {
                 voxelize_triangle(rule, &mesh.of(triangle), clip, sink, &mut scratch);
             }
         }
-        #[cfg(feature = "threads")]
-        Selection::Some(indices) => {
+        Some(indices) => {
             for &index in indices {
                 voxelize_triangle(rule, &mesh.of(mesh.triangles[index as usize]), clip, sink, &mut scratch);
             }
         }
-        #[cfg(not(feature = "threads"))]
-        Selection::Never(never) => match *never {},
     }
 }
 
@@ -85,10 +73,11 @@ fn clip_of(volume_dims: [u32; 3], x_range: std::ops::Range<u32>) -> VoxelBox {
     VoxelBox { low: [i64::from(x_range.start), 0, 0], high: [i64::from(x_range.end) - 1, ny - 1, nz - 1] }
 }
 
+#[cfg_attr(not(feature = "threads"), expect(unused_variables, reason = "only sorting looks at the mesh"))]
 fn for_each_slab<C: Into<i64> + Copy + Send + Sync>(
     mesh: Corners<'_, C>,
     volume: &mut Volume,
-    work: impl Fn(Slab<'_>, &VoxelBox, Selection<'_>) + Send + Sync,
+    work: impl Fn(Slab<'_>, &VoxelBox, Option<&[u32]>) + Send + Sync,
 ) {
     #[cfg(feature = "threads")]
     {
@@ -104,14 +93,14 @@ fn for_each_slab<C: Into<i64> + Copy + Send + Sync>(
     let (columns, column_words) = (dims[1] as usize, volume.column_words());
     volume.clear();
     let slab = Slab { words: volume.words_mut(), x_start: 0, columns, column_words };
-    work(slab, &clip_of(dims, 0..dims[0]), Selection::All);
+    work(slab, &clip_of(dims, 0..dims[0]), None);
 }
 
 #[cfg(feature = "threads")]
 mod parallel {
     use rayon::prelude::*;
 
-    use super::{Corners, Selection, Slab, VoxelBox, clip_of};
+    use super::{Corners, Slab, VoxelBox, clip_of};
     use crate::volume::Volume;
 
     /// Triangles sorted by one task.
@@ -154,7 +143,7 @@ mod parallel {
         mesh: Corners<'_, C>,
         volume: &mut Volume,
         threads: usize,
-        work: impl Fn(Slab<'_>, &VoxelBox, Selection<'_>) + Send + Sync,
+        work: impl Fn(Slab<'_>, &VoxelBox, Option<&[u32]>) + Send + Sync,
     ) {
         let dims = volume.grid().dims();
         let cuts = cut(mesh, dims, threads * 8);
@@ -176,7 +165,7 @@ mod parallel {
             }
             let clip = clip_of(dims, range.clone());
             let slab = Slab { words, x_start: i64::from(range.start), columns, column_words };
-            work(slab, &clip, Selection::Some(&list));
+            work(slab, &clip, Some(&list));
         });
     }
 

@@ -1,7 +1,7 @@
 //! Built-in procedural scenes: what `scene:NAME` and `scene:NAME:N` stand for.
 //!
 //! A scene depends on its name and parameter alone. Only additions, multiplications, divisions and square roots make its
-//! coordinates ([`numbers`] has its own sines), all of which IEEE 754 rounds the same everywhere, so a scene is the same
+//! coordinates (`numbers` has its own sines), all of which IEEE 754 rounds the same everywhere, so a scene is the same
 //! to the last bit on every platform.
 
 mod builder;

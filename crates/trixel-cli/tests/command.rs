@@ -1,0 +1,307 @@
+//! The real binary in a fresh folder: what it writes, what it says, how it exits.
+
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+/// A folder to run in.
+struct Bench(TempDir);
+
+/// What a run said.
+struct Ran {
+    status: i32,
+    stdout: String,
+    stderr: String,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn run(&self, arguments: &str) -> Ran {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_trixel"));
+        let Output { status, stdout, stderr } =
+            command.args(arguments.split_whitespace()).current_dir(&self.0).output().unwrap();
+        Ran {
+            status: status.code().unwrap(),
+            stdout: String::from_utf8(stdout).unwrap(),
+            stderr: String::from_utf8(stderr).unwrap(),
+        }
+    }
+
+    /// Runs what must succeed without a warning.
+    fn ok(&self, arguments: &str) -> Ran {
+        let ran = self.run(arguments);
+        assert_eq!(ran.status, 0, "{arguments}: {}", ran.stderr);
+        ran
+    }
+
+    /// Runs what must fail with `status` and say each of `words`, leaving the folder as it was.
+    fn fails(&self, status: i32, arguments: &str, words: &[&str]) {
+        let before = self.files();
+        let ran = self.run(arguments);
+        assert_eq!(ran.status, status, "{arguments}: {}{}", ran.stdout, ran.stderr);
+        for word in words {
+            assert!(ran.stderr.contains(word), "{arguments}: no `{word}` in {}", ran.stderr);
+        }
+        assert!(!ran.stderr.contains("panicked"), "{arguments}: {}", ran.stderr);
+        assert_eq!(self.files(), before, "{arguments} left files behind");
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).unwrap();
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn json(&self, name: &str) -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(self.path(name)).unwrap()).unwrap()
+    }
+
+    fn files(&self) -> Vec<String> {
+        let mut names: Vec<_> = std::fs::read_dir(&self.0)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+const TETRAHEDRON: &str = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+#[test]
+fn the_main_job_writes_a_volume_a_picture_and_a_report() {
+    let bench = Bench::new();
+    let ran = bench.ok("voxelize scene:torus:64 --resolution 32 -o torus.npz -o torus.png --report report.json");
+    assert_eq!(bench.files(), ["report.json", "torus.npz", "torus.png"]);
+    assert!(ran.stdout.is_empty(), "{}", ran.stdout);
+    assert!(std::fs::read(bench.path("torus.png")).unwrap().starts_with(b"\x89PNG"));
+    let report = bench.json("report.json");
+    assert_eq!(report["mode"], "conservative");
+    assert_eq!(report["backend"], "cpu");
+    assert_eq!(report["strategy"], "column-runs");
+    assert!(report["adapter"].is_null());
+    assert_eq!(report["mesh"]["triangles"], 64 * 64);
+    assert_eq!(report["mesh"]["open_edges"], 0);
+    assert_eq!(report["grid"]["dims"], serde_json::json!([32, 32, 10]));
+    assert!(report["voxels"].as_u64().unwrap() > 1000);
+    for stage in ["read", "snap", "allocate", "voxelize", "write", "total"] {
+        assert!(report["stages_ms"][stage].is_number(), "{stage}");
+    }
+    assert!(report["warnings"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn repeat_reports_every_sample() {
+    let bench = Bench::new();
+    bench.ok("voxelize scene:cube --report r.json --repeat 5 -q");
+    assert_eq!(bench.json("r.json")["samples_ms"]["voxelize"].as_array().unwrap().len(), 5);
+}
+
+#[test]
+fn every_format_is_written() {
+    let bench = Bench::new();
+    for extension in ["npz", "npy", "binvox", "vox", "vti", "nrrd", "obj", "ply", "stl", "glb", "raw", "png", "NPZ"] {
+        bench.ok(&format!("voxelize scene:cube -r 8 -o out.{extension}"));
+        assert!(bench.path(&format!("out.{extension}")).metadata().unwrap().len() > 0);
+    }
+    assert!(bench.path("out.json").exists());
+}
+
+#[test]
+fn the_number_of_threads_changes_no_byte() {
+    let bench = Bench::new();
+    for mode in ["conservative", "thin", "solid", "sliced"] {
+        for threads in [1, 2, 5] {
+            bench.ok(&format!(
+                "voxelize scene:room:16 -r 100 -m {mode} -t {threads} -q -o {threads}.npz -o {threads}.vti"
+            ));
+        }
+        for extension in ["npz", "vti"] {
+            let bytes = |threads: i32| std::fs::read(bench.path(&format!("{threads}.{extension}"))).unwrap();
+            assert_eq!(bytes(1), bytes(2));
+            assert_eq!(bytes(1), bytes(5));
+        }
+    }
+}
+
+#[test]
+fn grids_are_made_in_every_way() {
+    let bench = Bench::new();
+    bench.write("t.obj", TETRAHEDRON);
+    let dims = |arguments: &str| {
+        bench.ok(&format!("voxelize {arguments} --report r.json"));
+        let grid = bench.json("r.json")["grid"].clone();
+        (grid["dims"].clone(), grid["voxel_size"].clone(), grid["origin"].clone())
+    };
+    let json = |value: serde_json::Value| value;
+    use serde_json::json as j;
+    assert_eq!(dims("t.obj -r 10"), (j!([10, 10, 10]), j!([0.4, 0.4, 0.4]), j!([0.0, 0.0, 0.0])));
+    assert_eq!(dims("t.obj"), (j!([128, 128, 128]), j!([0.03125, 0.03125, 0.03125]), j!([0.0, 0.0, 0.0])));
+    assert_eq!(dims("t.obj --voxel-size 0.5"), (j!([8, 8, 8]), j!([0.5, 0.5, 0.5]), j!([0.0, 0.0, 0.0])));
+    // The input may stand where --voxel-size would take up to three numbers.
+    assert_eq!(dims("--voxel-size 0.5 t.obj"), (j!([8, 8, 8]), j!([0.5, 0.5, 0.5]), j!([0.0, 0.0, 0.0])));
+    assert_eq!(dims("--voxel-size 0.5 1 2 t.obj"), (j!([8, 4, 2]), j!([0.5, 1.0, 2.0]), j!([0.0, 0.0, 0.0])));
+    assert_eq!(
+        dims("t.obj --voxel-size 1 --origin -2 -1 0"),
+        (j!([6, 5, 4]), j!([1.0, 1.0, 1.0]), j!([-2.0, -1.0, 0.0]))
+    );
+    assert_eq!(dims("t.obj --dims 8 16 4"), (j!([8, 16, 4]), j!([1.0, 1.0, 1.0]), j!([0.0, 0.0, 0.0])));
+    assert_eq!(
+        dims("t.obj --dims 3 4 5 --origin 0.5 0.5 0.5 --voxel-size 0.25"),
+        (j!([3, 4, 5]), j!([0.25, 0.25, 0.25]), j!([0.5, 0.5, 0.5]))
+    );
+    for like in ["like.npz", "like.vti", "like.nrrd", "like.raw"] {
+        bench.ok(&format!("voxelize t.obj --dims 3 4 5 --origin 0.5 0.5 0.5 --voxel-size 0.25 0.5 1 -o {like}"));
+        let expected = json(j!([0.25, 0.5, 1.0]));
+        assert_eq!(dims(&format!("t.obj --like {like}")), (j!([3, 4, 5]), expected, j!([0.5, 0.5, 0.5])), "{like}");
+    }
+}
+
+#[test]
+fn verify_finds_what_differs() {
+    let bench = Bench::new();
+    bench.ok("voxelize scene:sphere:8 -r 20 -o s.npz -o s.vti");
+    for volume in ["s.npz", "s.vti"] {
+        let ran = bench.ok(&format!("verify {volume} scene:sphere:8 --mode conservative"));
+        assert!(ran.stdout.contains("0 missing, 0 extra: equal"), "{}", ran.stdout);
+    }
+    let ran = bench.run("verify s.npz scene:sphere:8 --mode thin --list 2");
+    assert_eq!(ran.status, 1);
+    assert_eq!(ran.stdout.lines().filter(|line| line.starts_with("extra voxel [")).count(), 2, "{}", ran.stdout);
+    assert!(ran.stdout.contains("more extra"));
+    bench.ok("voxelize scene:sphere:8 --like s.npz --mode solid -o solid.npz --sparse");
+    bench.ok("verify solid.npz scene:sphere:8 --mode solid");
+    let ran = bench.run("verify solid.npz scene:sphere:8");
+    assert!(ran.stdout.contains("missing voxel ["), "{}", ran.stdout);
+}
+
+#[test]
+fn info_describes_meshes_and_volumes() {
+    let bench = Bench::new();
+    bench.write("t.obj", TETRAHEDRON);
+    let ran = bench.ok("info t.obj");
+    assert!(ran.stdout.contains("closed") && ran.stdout.contains("triangles            4"), "{}", ran.stdout);
+    let info: serde_json::Value = serde_json::from_str(&bench.ok("info t.obj --json").stdout).unwrap();
+    assert_eq!((&info["edges"], &info["open_edges"], &info["closed"]), (&6.into(), &0.into(), &true.into()));
+    bench.ok("voxelize t.obj -r 4 -o t.npz");
+    let info: serde_json::Value = serde_json::from_str(&bench.ok("info t.npz --json").stdout).unwrap();
+    assert_eq!(info["grid"]["dims"], serde_json::json!([4, 4, 4]));
+    assert!(bench.ok("info t.npz").stdout.contains("set voxels"));
+    assert!(bench.ok("info scene:city:3").stdout.contains("components           9"));
+}
+
+#[test]
+fn wrong_usage_exits_with_2() {
+    let bench = Bench::new();
+    for (arguments, words) in [
+        ("voxelize", &["INPUT"][..]),
+        ("voxelize scene:cube", &["-o", "--report"]),
+        ("voxelize scene:cube -o a.npz --resolution 0", &["0"]),
+        ("voxelize scene:cube -o a.npz --resolution 40000", &["32768"]),
+        ("voxelize scene:cube -o a.npz --resolution 8 --voxel-size 1", &["cannot be used with"]),
+        ("voxelize scene:cube -o a.npz --like b.npz --dims 1 1 1", &["cannot be used with"]),
+        ("voxelize scene:cube -o a.npz --voxel-size -1", &["-1", "positive"]),
+        ("voxelize scene:cube -o a.npz --voxel-size nan", &["nan", "positive"]),
+        ("voxelize scene:cube -o a.npz --voxel-size 1 2", &["HX HY HZ"]),
+        ("voxelize scene:cube -o a.npz --origin 0 0 0", &["--voxel-size", "--dims"]),
+        ("voxelize scene:cube -o a.npz --voxel-size 1 --origin inf 0 0", &["finite"]),
+        ("voxelize scene:cube -o a.npz --mode sold", &["solid"]),
+        ("voxelize scene:cube -o a.npz --overlap 1", &["sliced"]),
+        ("voxelize scene:cube -o a.npz --mode sliced --overlap -1", &["0 to 1024"]),
+        ("voxelize scene:cube -o a.npz --threads 0", &["0"]),
+        ("voxelize scene:cube -o a.npz --repeat 0", &["0"]),
+        ("voxelize scene:cube -o a.npz -o a.npz", &["twice"]),
+        ("voxelise scene:cube", &["voxelize"]),
+        ("verify a.npz", &["MESH"]),
+    ] {
+        bench.fails(2, arguments, words);
+    }
+}
+
+#[test]
+fn failures_exit_with_1_and_say_what_to_do() {
+    let bench = Bench::new();
+    bench.write("t.obj", TETRAHEDRON);
+    bench.write("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n");
+    bench.write("far.obj", "v 0 0 0\nv 1 1e30 0\nv 0 1 0\nf 1 2 3\n");
+    bench.write("point.obj", "v 1 1 1\nf 1 1 1\n");
+    bench.write("points.obj", "v 1 1 1\nv 2 2 2\n");
+    bench.write("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
+    bench.write("what.xyz", "1 2 3\n");
+    bench.write("broken.npz", "PK");
+    for (arguments, words) in [
+        ("voxelize none.obj -o a.npz", &["none.obj", "No such file"][..]),
+        ("voxelize what.xyz -o a.npz", &["what.xyz", ".obj"]),
+        ("voxelize scene:tours -o a.npz", &["tours", "torus"]),
+        ("voxelize scene:torus:0 -o a.npz", &["torus", "6"]),
+        ("voxelize nan.obj -o a.npz", &["nan.obj", "vertex 1"]),
+        ("voxelize far.obj -o a.npz --voxel-size 1", &["voxels"]),
+        ("voxelize far.obj -o a.npz --voxel-size 1 --dims 4 4 4", &["far.obj", "vertex 1", "16,777,216"]),
+        ("voxelize point.obj -o a.npz", &["single point", "voxel size"]),
+        ("voxelize points.obj -o a.npz", &["points.obj", "no triangles"]),
+        ("voxelize index.obj -o a.npz", &["index.obj", "9"]),
+        ("voxelize t.obj -o a.xyz", &["a.xyz", ".npz", ".png"]),
+        ("voxelize t.obj -o a", &["a", ".npz"]),
+        ("voxelize t.obj -o a.npz -o none/b.npz", &["none"]),
+        ("voxelize t.obj -o a.npz -o none/b.png", &["none"]),
+        ("voxelize t.obj -o a.npz --report none/r.json", &["none"]),
+        ("voxelize t.obj -o t.obj", &["t.obj", "input"]),
+        ("voxelize t.obj -o a.npz -o a.vox -r 3000", &["a.vox", "2000"]),
+        ("voxelize t.obj -o a.binvox --voxel-size 1 2 3", &["a.binvox"]),
+        ("voxelize t.obj -o a.npz --dims 32768 32768 32768", &["4.0 TiB", "available", "resolution"]),
+        ("voxelize t.obj -o a.npz --voxel-size 1e-9", &["32768"]),
+        ("voxelize t.obj -o a.npz --like none.npz", &["none.npz"]),
+        ("voxelize t.obj -o a.npz --like broken.npz", &["broken.npz"]),
+        ("voxelize t.obj -o a.npz --like t.obj", &["t.obj"]),
+        ("info none.obj", &["none.obj"]),
+        ("info broken.npz", &["broken.npz"]),
+        ("verify broken.npz t.obj", &["broken.npz"]),
+    ] {
+        bench.fails(1, arguments, words);
+    }
+}
+
+#[test]
+fn a_failed_run_leaves_earlier_outputs_alone() {
+    let bench = Bench::new();
+    bench.write("a.npz", "mine");
+    bench.fails(1, "voxelize scene:cube -r 3000 -o a.npz -o b.vox", &[]);
+    assert_eq!(std::fs::read(bench.path("a.npz")).unwrap(), b"mine");
+    bench.ok("voxelize scene:cube -r 8 -o a.npz");
+    assert!(std::fs::read(bench.path("a.npz")).unwrap().starts_with(b"PK"));
+}
+
+#[test]
+fn warnings_are_printed_and_reported() {
+    let bench = Bench::new();
+    bench.write("open.obj", "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nf 1 3 2\nf 1 2 4\nf 1 4 3\n");
+    let ran = bench.ok("voxelize open.obj -r 8 --mode solid --report r.json");
+    assert!(ran.stderr.contains("warning: the mesh is not closed: 3 open and 0 non-manifold edges"), "{}", ran.stderr);
+    assert_eq!(bench.json("r.json")["warnings"].as_array().unwrap().len(), 1);
+    let ran = bench.ok("voxelize open.obj -r 8 --mode solid --quiet -o a.npz");
+    assert!(ran.stderr.is_empty(), "{}", ran.stderr);
+    let ran = bench.ok("voxelize open.obj --dims 4 4 4 --origin 9 9 9 --voxel-size 1 -o a.npz");
+    assert!(ran.stderr.contains("no voxel is set"), "{}", ran.stderr);
+}
+
+#[test]
+fn help_and_completions_are_there() {
+    let bench = Bench::new();
+    let help = bench.ok("voxelize --help").stdout;
+    for word in ["--resolution", "--mode", "26-separating", "scene:torus", "hairball", "Exit status", ".binvox"] {
+        assert!(help.contains(word), "no `{word}` in the help");
+    }
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        assert!(bench.ok(&format!("completions {shell}")).stdout.contains("trixel"));
+    }
+    assert!(bench.ok("--version").stdout.contains(env!("CARGO_PKG_VERSION")));
+    assert!(Path::new(env!("CARGO_BIN_EXE_trixel")).exists());
+}
