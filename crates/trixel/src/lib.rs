@@ -1,4 +1,35 @@
-//! Exact mesh voxelization.
+//! Exact mesh voxelization: the library.
+//!
+//! A [`Mesh`] is snapped to the lattice of a [`Grid`] and voxelized by a [`Backend`] into a [`Volume`], one bit a voxel.
+//! Each [`Mode`] has one definition in integers, so there is one right answer, whatever the backend, strategy or number of
+//! threads. It follows and extends
+//!
+//! - **\[HCV\]** R. Rauwendaal, *Hybrid Computational Voxelization Using the Graphics Pipeline*, MSc thesis, Oregon State
+//!   University, 2012
+//! - **\[CL\]** H.-H. Chang and Y.-C. Lai, *Real-time GPU-based Voxelization and Applications*, TR 1688, 2011
+//!
+//! ```
+//! use trixel::{Grid, Job, Mode};
+//!
+//! let mesh = trixel::scene::build("torus:64")?;
+//! let bounds = mesh.bounds().expect("a torus has triangles");
+//! let job = Job::new(Grid::fit(&bounds, 100)?, Mode::Solid);
+//! let volume = trixel::voxelize(&mesh, &job)?;
+//! assert!(volume.get([15, 50, 14]) && !volume.get([50, 50, 14]));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! To voxelize many times into one volume, use the steps: [`lattice::LatticeMesh::snap`], [`Volume::new`] and
+//! [`CpuBackend`]'s [`Backend::voxelize`].
+//!
+//! # Features
+//!
+//! - `threads` (default): rayon. Without it everything runs on the calling thread.
+//! - `conformance`: the oracle and the suite for those who write a backend.
+
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;
 
 mod backend;
 #[cfg(any(test, feature = "conformance"))]
