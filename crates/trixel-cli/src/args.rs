@@ -66,7 +66,7 @@ Exit status: 0 done, 1 failed (one message on standard error says what, where, a
 
 #[derive(Debug, Args)]
 pub(crate) struct VoxelizeArgs {
-    /// A mesh file, or scene:NAME[:N].
+    /// A mesh file, or scene:NAME or scene:NAME:N.
     #[arg(value_name = "INPUT")]
     pub(crate) input: Option<String>,
 
@@ -171,7 +171,7 @@ fn parse_overlap(text: &str) -> Result<f64, String> {
 
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// A mesh file, a volume (.npz, .npy, .binvox, .vti, .nrrd, .raw), or scene:NAME[:N].
+    /// A mesh file, a volume (.npz, .npy, .binvox, .vti, .nrrd, .raw), or scene:NAME or scene:NAME:N.
     #[arg(value_name = "FILE")]
     pub(crate) file: String,
 
@@ -186,7 +186,7 @@ pub(crate) struct VerifyArgs {
     #[arg(value_name = "VOLUME")]
     pub(crate) volume: PathBuf,
 
-    /// The mesh that it should be the voxels of, or scene:NAME[:N].
+    /// The mesh that it should be the voxels of, or scene:NAME or scene:NAME:N.
     #[arg(value_name = "MESH")]
     pub(crate) mesh: String,
 
