@@ -49,13 +49,19 @@ pub fn voxelize(mesh: &LatticeMesh<'_>, job: &Job) -> Result<Volume, crate::volu
         };
         for x in range(0, 0, 0) {
             for y in range(1, 0, 0) {
+                // The same for every z: where the line through the column's centres meets the triangle.
+                let looks_along_z = matches!(job.mode(), Mode::Solid | Mode::Sliced);
+                let height = if looks_along_z { height_on_centre_line(triangle, x, y) } else { None };
+                if looks_along_z && height.is_none() {
+                    continue;
+                }
                 for z in range(2, z_low, z_high) {
                     let voxel = [x, y, z];
                     let hit = match job.mode() {
                         Mode::Conservative => conservative(triangle, voxel),
                         Mode::Thin => thin(triangle, voxel),
-                        Mode::Sliced => sliced(triangle, voxel, overlap),
-                        Mode::Solid => crosses_below(triangle, voxel),
+                        Mode::Sliced => height.is_some_and(|height| height.is_in_slice(z, overlap)),
+                        Mode::Solid => height.is_some_and(|height| height.is_at_or_below_centre(z)),
                     };
                     if hit {
                         let voxel = voxel.map(|i| u32::try_from(i).unwrap_or(u32::MAX));
@@ -83,15 +89,15 @@ fn toggle(volume: &mut Volume, [x, y, z]: [u32; 3]) {
 pub fn conservative(triangle: [Vector; 3], voxel: Vector) -> bool {
     let edges = [0, 1, 2].map(|k| sub(triangle[(k + 1) % 3], triangle[k]));
     let units = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
-    let mut axes = units.to_vec();
-    axes.push(cross(edges[0], edges[1]));
-    axes.extend(edges.iter().flat_map(|&edge| units.map(|unit| cross(edge, unit))));
-    axes.into_iter().all(|axis| {
+    let apart = |axis: Vector| {
         let corners = (0..8).map(|i| [0, 1, 2].map(|a| (voxel[a] + (i >> a & 1)) * S));
         let (cube_low, cube_high) = interval(corners.map(|corner| dot(axis, corner)));
         let (low, high) = interval(triangle.iter().map(|&v| dot(axis, v)));
-        low <= cube_high && cube_low <= high
-    })
+        low > cube_high || cube_low > high
+    };
+    !units.into_iter().any(apart)
+        && !apart(cross(edges[0], edges[1]))
+        && !edges.into_iter().any(|edge| units.into_iter().any(|unit| apart(cross(edge, unit))))
 }
 
 fn interval(values: impl Iterator<Item = i128>) -> (i128, i128) {
@@ -137,10 +143,31 @@ pub fn thin(triangle: [Vector; 3], voxel: Vector) -> bool {
     })
 }
 
-/// Whether the line along z through the voxel's centre, shifted by (+e, +e^2), meets the triangle; then the height of
-/// the meeting point without the shift, times `2 * N_z`, and `2 * N_z`, which is made positive.
-fn height_on_centre_line(triangle: [Vector; 3], voxel: Vector) -> Option<(i128, i128)> {
-    let centre2 = [(2 * voxel[0] + 1) * S, (2 * voxel[1] + 1) * S];
+/// A height above the grid's floor, in steps, as a fraction.
+#[derive(Clone, Copy)]
+struct Height {
+    numerator: i128,
+    /// Positive.
+    denominator: i128,
+}
+
+impl Height {
+    /// Inside the closed slice of voxel `z`, extended by `overlap` steps on both sides.
+    fn is_in_slice(self, z: i128, overlap: i128) -> bool {
+        let (low, high) = (z * S - overlap, (z + 1) * S + overlap);
+        low * self.denominator <= self.numerator && self.numerator <= high * self.denominator
+    }
+
+    /// Not above the centre of voxel `z`.
+    fn is_at_or_below_centre(self, z: i128) -> bool {
+        2 * self.numerator <= (2 * z + 1) * S * self.denominator
+    }
+}
+
+/// Where the line along z through the centres of column (x, y), shifted by (+e, +e^2), meets the triangle; the height
+/// is that without the shift.
+fn height_on_centre_line(triangle: [Vector; 3], x: i128, y: i128) -> Option<Height> {
+    let centre2 = [(2 * x + 1) * S, (2 * y + 1) * S];
     let normal = cross(sub(triangle[1], triangle[0]), sub(triangle[2], triangle[0]));
     if normal[2] == 0 {
         return None;
@@ -158,20 +185,5 @@ fn height_on_centre_line(triangle: [Vector; 3], voxel: Vector) -> Option<(i128, 
     // N . (P - v0) = 0 for P = (centre, height).
     let v = triangle[0];
     let height = 2 * normal[2] * v[2] - normal[0] * (centre2[0] - 2 * v[0]) - normal[1] * (centre2[1] - 2 * v[1]);
-    Some((height * sign, 2 * normal[2].abs()))
-}
-
-/// The line through the centre meets the triangle inside the closed slice, extended by `overlap` steps.
-#[must_use]
-pub fn sliced(triangle: [Vector; 3], voxel: Vector, overlap: i128) -> bool {
-    height_on_centre_line(triangle, voxel).is_some_and(|(height, scale)| {
-        let (low, high) = (voxel[2] * S - overlap, (voxel[2] + 1) * S + overlap);
-        low * scale <= height && height <= high * scale
-    })
-}
-
-/// The ray from the centre towards -z crosses the triangle; a centre on the triangle counts as above it.
-#[must_use]
-pub fn crosses_below(triangle: [Vector; 3], voxel: Vector) -> bool {
-    height_on_centre_line(triangle, voxel).is_some_and(|(height, scale)| 2 * height <= (2 * voxel[2] + 1) * S * scale)
+    Some(Height { numerator: height * sign, denominator: 2 * normal[2].abs() })
 }

@@ -1,20 +1,22 @@
 //! The CPU backend.
 //!
-//! - `column_runs`: the kernel, one triangle at a time
-//! - `small`: its path for triangles of a few voxels
-//! - `setup`: what both compute first
+//! - `kernel`: one triangle after the other, each to the path for its size
+//! - `tiny`, `rows`, `large`: the paths
+//! - `setup`: what paths compute first
 //! - `rule`: the modes as thresholds
 //! - `number`: exact integers and floor lines
 //! - `sink`: runs into bits, toggles into parity
 //! - `slabs`: the grid cut along x, one piece a task, so that threads never share a word
 
-mod column_runs;
+mod kernel;
+mod large;
 mod number;
+mod rows;
 mod rule;
 mod setup;
 mod sink;
 mod slabs;
-mod small;
+mod tiny;
 
 use crate::backend::{Backend, Error};
 use crate::job::{Job, Strategy};
@@ -104,9 +106,9 @@ fn voxelize_mode<C: Into<i64> + Copy + Send + Sync>(
 ) {
     let mesh = slabs::Corners { positions, triangles };
     match job.mode() {
-        Mode::Conservative => slabs::set(&rule::Conservative, mesh, volume),
-        Mode::Thin => slabs::set(&rule::Thin, mesh, volume),
-        Mode::Sliced => slabs::set(&rule::Sliced { overlap: i64::from(job.overlap_steps()) }, mesh, volume),
+        Mode::Conservative => slabs::surface(&rule::Conservative, mesh, volume),
+        Mode::Thin => slabs::surface(&rule::Thin, mesh, volume),
+        Mode::Sliced => slabs::slice(&rule::Sliced { overlap: i64::from(job.overlap_steps()) }, mesh, volume),
         Mode::Solid => slabs::fill(mesh, volume),
     }
 }

@@ -3,6 +3,8 @@
 //! With voxel indices p, an edge of a projection is `n.p >= t` and the plane is `d1 <= N.p <= d2`. A mode is what it
 //! makes of t, d1 and d2. The forms follow [HCV] figures 6.1 and 6.2, in integers.
 
+use fearless_simd::{Simd, f64x8, prelude::*};
+
 use super::number::Int;
 use crate::lattice::STEPS_PER_VOXEL;
 
@@ -15,8 +17,9 @@ pub(super) trait Rule: Copy + Send + Sync {
     /// alone gives the run's ends.
     const SURFACE: bool;
 
-    /// Whether a triangle without extent in two axes sets every voxel of its box.
-    const BOX_IS_ENOUGH: bool;
+    /// Whether the voxels of a triangle are all those that it meets, so that a triangle strictly inside a row of voxels
+    /// sets the whole row, and one strictly inside a layer sets what its projection meets.
+    const TOUCH_IS_ENOUGH: bool;
 
     /// Whether a run goes on to the top of the clip whatever the plane's upper bound.
     const TO_TOP: bool = false;
@@ -32,6 +35,16 @@ pub(super) trait Rule: Copy + Send + Sync {
 
     /// `(d1, d2)` for the normal `n` (with `n[2] >= 0`) and the corner `v0` in local lattice coordinates.
     fn plane<T: Int>(&self, n: [T; 3], v0: [i64; 3]) -> (T, T);
+}
+
+/// What a surface mode adds to its tests in lattice steps, for triangles so small that floats are exact: an edge is
+/// `n . (S p - v) + edge_reach >= 0`, the plane `-above <= N . (S p - v0) <= -below`.
+pub(super) trait SurfaceRule: Rule {
+    /// The reach of an edge with inward normal `(na, nb)`.
+    fn edge_reach<V: Simd>(&self, simd: V, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V>;
+
+    /// `(above, below)` of the plane with normal `n`.
+    fn plane_reach<V: Simd>(&self, simd: V, n: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>);
 }
 
 /// `N.p + floor or ceil of the rest`, where `v0 = S p + rest`: keeps the products small. Gives N.p and N.(rest + shift).
@@ -58,7 +71,7 @@ pub(super) struct Conservative;
 
 impl Rule for Conservative {
     const SURFACE: bool = true;
-    const BOX_IS_ENOUGH: bool = true;
+    const TOUCH_IS_ENOUGH: bool = true;
 
     #[inline(always)]
     fn edge<T: Int>(&self, na: T, nb: T, nv: T) -> T {
@@ -76,13 +89,29 @@ impl Rule for Conservative {
     }
 }
 
+impl SurfaceRule for Conservative {
+    #[inline(always)]
+    fn edge_reach<V: Simd>(&self, simd: V, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V> {
+        let zero = f64x8::splat(simd, 0.0);
+        (na.max(zero) + nb.max(zero)) * f64::from(STEPS_PER_VOXEL)
+    }
+
+    #[inline(always)]
+    fn plane_reach<V: Simd>(&self, simd: V, n: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+        let zero = f64x8::splat(simd, 0.0);
+        let above = n[0].max(zero) + n[1].max(zero) + n[2].max(zero);
+        let below = n[0].min(zero) + n[1].min(zero) + n[2].min(zero);
+        (above * f64::from(STEPS_PER_VOXEL), below * f64::from(STEPS_PER_VOXEL))
+    }
+}
+
 /// [`crate::Mode::Thin`].
 #[derive(Clone, Copy)]
 pub(super) struct Thin;
 
 impl Rule for Thin {
     const SURFACE: bool = true;
-    const BOX_IS_ENOUGH: bool = false;
+    const TOUCH_IS_ENOUGH: bool = false;
 
     #[inline(always)]
     fn edge<T: Int>(&self, na: T, nb: T, nv: T) -> T {
@@ -95,6 +124,21 @@ impl Rule for Thin {
         let (whole, rest) = split(n, v0, [-S / 2; 3]);
         let reach = half * abs(n[0]).max(abs(n[1])).max(abs(n[2]));
         (whole + ceil_voxels(rest - reach), whole + (rest + reach).floor_voxels())
+    }
+}
+
+impl SurfaceRule for Thin {
+    #[inline(always)]
+    fn edge_reach<V: Simd>(&self, _simd: V, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V> {
+        (na + nb + na.abs().max(nb.abs())) * f64::from(STEPS_PER_VOXEL / 2)
+    }
+
+    #[inline(always)]
+    fn plane_reach<V: Simd>(&self, _simd: V, n: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+        let to_centre = n[0] + n[1] + n[2];
+        let reach = n[0].abs().max(n[1].abs()).max(n[2].abs());
+        let half = f64::from(STEPS_PER_VOXEL / 2);
+        ((to_centre + reach) * half, (to_centre - reach) * half)
     }
 }
 
@@ -112,7 +156,7 @@ pub(super) struct Solid;
 
 impl Rule for Solid {
     const SURFACE: bool = false;
-    const BOX_IS_ENOUGH: bool = false;
+    const TOUCH_IS_ENOUGH: bool = false;
     const TO_TOP: bool = true;
 
     #[inline(always)]
@@ -137,7 +181,7 @@ pub(super) struct Sliced {
 
 impl Rule for Sliced {
     const SURFACE: bool = false;
-    const BOX_IS_ENOUGH: bool = false;
+    const TOUCH_IS_ENOUGH: bool = false;
 
     #[inline(always)]
     fn fits_small(&self) -> bool {

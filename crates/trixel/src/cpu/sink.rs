@@ -7,8 +7,9 @@ pub(super) trait Sink {
     /// The voxels `(x, y, from..=to)`, all inside the clip that the kernel was given.
     fn run(&mut self, x: i64, y: i64, from: i64, to: i64);
 
-    /// The voxels `(x, y, z..z + 4)` whose bits are set in `bits`; those outside the clip are not set. `z` may be below 0.
-    fn four(&mut self, x: i64, y: i64, z: i64, bits: u64);
+    /// Voxels of the cube of two from `low` on: `low + (x, y, z)` where bit `4 x + 2 y + z` is set. The set ones are
+    /// inside the clip.
+    fn cube(&mut self, low: [i64; 3], bits: u64);
 }
 
 /// The words of the columns with `x` in a range: what one thread owns.
@@ -52,15 +53,17 @@ impl Sink for SetRuns<'_> {
 
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
-    fn four(&mut self, x: i64, y: i64, z: i64, bits: u64) {
-        let column = self.0.column(x, y);
-        let (bits, z) = if z < 0 { (bits >> -z, 0) } else { (bits, z as u32) };
+    fn cube(&mut self, low: [i64; 3], bits: u64) {
+        let z = low[2] as u32;
         let (word, shift) = ((z / WORD_BITS) as usize, z % WORD_BITS);
-        column[word] |= bits << shift;
-        if shift > WORD_BITS - 4 {
-            let above = bits >> (WORD_BITS - shift);
-            if above != 0 {
-                column[word + 1] |= above;
+        for i in 0..4i64 {
+            let pair = bits >> (2 * i) & 3;
+            if pair != 0 {
+                let column = self.0.column(low[0] + (i >> 1), low[1] + (i & 1));
+                column[word] |= pair << shift;
+                if shift == WORD_BITS - 1 && pair & 2 != 0 {
+                    column[word + 1] |= 1;
+                }
             }
         }
     }
@@ -77,9 +80,9 @@ impl Sink for ToggleRuns<'_> {
         self.0.column(x, y)[(from / WORD_BITS) as usize] ^= 1 << (from % WORD_BITS);
     }
 
-    /// Parity needs whole runs: the tiled path is for surfaces.
-    fn four(&mut self, x: i64, y: i64, z: i64, bits: u64) {
-        debug_assert!(false, "a tile of a solid at ({x}, {y}, {z}): {bits:#x}");
+    /// Parity needs whole runs: batches are for surfaces.
+    fn cube(&mut self, low: [i64; 3], bits: u64) {
+        debug_assert!(false, "a batch of a solid at {low:?}: {bits:#x}");
     }
 }
 

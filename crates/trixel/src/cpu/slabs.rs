@@ -3,9 +3,11 @@
 //! With one thread there is one slab and no sorting. With more, triangles are first sorted into the slabs that they
 //! meet; slabs are cut so that each holds about the same work, and there are several a thread to level the rest.
 
-use super::column_runs::{Scratch, VoxelBox, voxelize_triangle};
-use super::rule::{Rule, Solid};
-use super::sink::{SetRuns, Sink, Slab, ToggleRuns, prefix_xor};
+use fearless_simd::{Level, dispatch};
+
+use super::kernel::{self, VoxelBox};
+use super::rule::{Sliced, Solid, SurfaceRule};
+use super::sink::{SetRuns, Slab, ToggleRuns, prefix_xor};
 use crate::volume::Volume;
 
 /// Triangles whose corners are lattice positions.
@@ -15,7 +17,45 @@ pub(super) struct Corners<'a, C> {
     pub(super) triangles: &'a [[u32; 3]],
 }
 
-impl<C: Into<i64> + Copy> Corners<'_, C> {
+/// A lattice coordinate, narrow or wide.
+pub(super) trait Coordinate: Into<i64> + Copy + Send + Sync {}
+
+impl<C: Into<i64> + Copy + Send + Sync> Coordinate for C {}
+
+/// The corners of triangles, one triangle after the other.
+#[derive(Clone, Copy)]
+pub(super) struct Selected<'a, C> {
+    corners: Corners<'a, C>,
+    indices: Option<&'a [u32]>,
+}
+
+impl<C: Coordinate> Selected<'_, C> {
+    /// Calls `each` with the corners of every triangle.
+    #[inline(always)]
+    pub(super) fn for_each(&self, mut each: impl FnMut(&[[i64; 3]; 3])) {
+        match self.indices {
+            None => {
+                for &triangle in self.corners.triangles {
+                    each(&self.corners.of(triangle));
+                }
+            }
+            Some(indices) => {
+                for &index in indices {
+                    each(&self.corners.of(self.corners.triangles[index as usize]));
+                }
+            }
+        }
+    }
+}
+
+impl<'a, C: Coordinate> Corners<'a, C> {
+    /// The triangles with the given indices, or all.
+    #[inline(always)]
+    fn select(self, indices: Option<&'a [u32]>) -> Selected<'a, C> {
+        Selected { corners: self, indices }
+    }
+
+    /// The corners of one triangle.
     #[inline(always)]
     fn of(&self, triangle: [u32; 3]) -> [[i64; 3]; 3] {
         let corner = |vertex: u32| {
@@ -26,45 +66,34 @@ impl<C: Into<i64> + Copy> Corners<'_, C> {
     }
 }
 
-/// Clears the volume and sets the runs of a surface mode.
-pub(super) fn set<R: Rule, C: Into<i64> + Copy + Send + Sync>(rule: &R, mesh: Corners<'_, C>, volume: &mut Volume) {
+/// Clears the volume and sets the voxels of a surface mode.
+pub(super) fn surface<R: SurfaceRule, C: Coordinate>(rule: &R, mesh: Corners<'_, C>, volume: &mut Volume) {
+    let level = Level::new();
     for_each_slab(mesh, volume, |slab, clip, triangles| {
-        run_all(rule, mesh, triangles, clip, &mut SetRuns(slab));
+        let mut sink = SetRuns(slab);
+        dispatch!(level, simd => kernel::surface(simd, rule, mesh.select(triangles), clip, &mut sink));
+    });
+}
+
+/// Clears the volume and sets the voxels of [`crate::Mode::Sliced`].
+pub(super) fn slice<C: Coordinate>(rule: &Sliced, mesh: Corners<'_, C>, volume: &mut Volume) {
+    let level = Level::new();
+    for_each_slab(mesh, volume, |slab, clip, triangles| {
+        let mut sink = SetRuns(slab);
+        dispatch!(level, simd => kernel::centres(simd, rule, mesh.select(triangles), clip, &mut sink));
     });
 }
 
 /// Clears the volume and sets the voxels inside the mesh.
-pub(super) fn fill<C: Into<i64> + Copy + Send + Sync>(mesh: Corners<'_, C>, volume: &mut Volume) {
+pub(super) fn fill<C: Coordinate>(mesh: Corners<'_, C>, volume: &mut Volume) {
+    let level = Level::new();
     let nz = volume.grid().dims()[2];
     for_each_slab(mesh, volume, |slab, clip, triangles| {
         let column_words = slab.column_words;
         let mut sink = ToggleRuns(slab);
-        run_all(&Solid, mesh, triangles, clip, &mut sink);
+        dispatch!(level, simd => kernel::centres(simd, &Solid, mesh.select(triangles), clip, &mut sink));
         prefix_xor(sink.0.words, column_words, nz);
     });
-}
-
-/// Runs the kernel over the triangles with the given indices, or over all.
-fn run_all<R: Rule, C: Into<i64> + Copy>(
-    rule: &R,
-    mesh: Corners<'_, C>,
-    selection: Option<&[u32]>,
-    clip: &VoxelBox,
-    sink: &mut impl Sink,
-) {
-    let mut scratch = Scratch::default();
-    match selection {
-        None => {
-            for &triangle in mesh.triangles {
-                voxelize_triangle(rule, &mesh.of(triangle), clip, sink, &mut scratch);
-            }
-        }
-        Some(indices) => {
-            for &index in indices {
-                voxelize_triangle(rule, &mesh.of(mesh.triangles[index as usize]), clip, sink, &mut scratch);
-            }
-        }
-    }
 }
 
 /// The voxels with x in `x_range` (its end excluded).
@@ -74,7 +103,7 @@ fn clip_of(volume_dims: [u32; 3], x_range: std::ops::Range<u32>) -> VoxelBox {
 }
 
 #[cfg_attr(not(feature = "threads"), expect(unused_variables, reason = "only sorting looks at the mesh"))]
-fn for_each_slab<C: Into<i64> + Copy + Send + Sync>(
+fn for_each_slab<C: Coordinate>(
     mesh: Corners<'_, C>,
     volume: &mut Volume,
     work: impl Fn(Slab<'_>, &VoxelBox, Option<&[u32]>) + Send + Sync,
@@ -100,7 +129,7 @@ fn for_each_slab<C: Into<i64> + Copy + Send + Sync>(
 mod parallel {
     use rayon::prelude::*;
 
-    use super::{Corners, Slab, VoxelBox, clip_of};
+    use super::{Coordinate, Corners, Slab, VoxelBox, clip_of};
     use crate::volume::Volume;
 
     /// Triangles sorted by one task.
@@ -123,7 +152,7 @@ mod parallel {
         8 + u64::try_from(columns).unwrap_or(0)
     }
 
-    pub(super) fn weight_at_least<C: Into<i64> + Copy>(mesh: Corners<'_, C>, volume: &Volume, limit: u64) -> bool {
+    pub(super) fn weight_at_least<C: Coordinate>(mesh: Corners<'_, C>, volume: &Volume, limit: u64) -> bool {
         let [nx, ny, _] = volume.grid().dims().map(i64::from);
         let mut total = 0;
         for &triangle in mesh.triangles {
@@ -139,7 +168,7 @@ mod parallel {
         volume.words().len() > 1 << 18
     }
 
-    pub(super) fn for_each_slab<C: Into<i64> + Copy + Send + Sync>(
+    pub(super) fn for_each_slab<C: Coordinate>(
         mesh: Corners<'_, C>,
         volume: &mut Volume,
         threads: usize,
@@ -170,7 +199,7 @@ mod parallel {
     }
 
     /// Where to cut x so that each of up to `pieces` slabs holds about the same work; first 0, last nx.
-    fn cut<C: Into<i64> + Copy + Send + Sync>(mesh: Corners<'_, C>, dims: [u32; 3], pieces: usize) -> Vec<u32> {
+    fn cut<C: Coordinate>(mesh: Corners<'_, C>, dims: [u32; 3], pieces: usize) -> Vec<u32> {
         let nx = dims[0] as usize;
         let [nx_signed, ny, _] = dims.map(i64::from);
         // Differences of the work at each x, so that a triangle costs two additions however long it is.
@@ -220,7 +249,7 @@ mod parallel {
     }
 
     /// The indices of the triangles that meet each slab.
-    fn sort<C: Into<i64> + Copy + Send + Sync>(mesh: Corners<'_, C>, dims: [u32; 3], cuts: &[u32]) -> Vec<Vec<u32>> {
+    fn sort<C: Coordinate>(mesh: Corners<'_, C>, dims: [u32; 3], cuts: &[u32]) -> Vec<Vec<u32>> {
         let slabs = cuts.len() - 1;
         let mut slab_of_x = vec![0u32; dims[0] as usize];
         for (slab, range) in (0u32..).zip(cuts.windows(2)) {

@@ -1,0 +1,186 @@
+//! The kernel: one triangle after the other, each to the path for its size.
+//!
+//! The voxels that one triangle sets in one grid column along z are one run, whatever the mode. How its ends are found
+//! depends on the size of the triangle's box:
+//!
+//! | box | path |
+//! |---|---|
+//! | one voxel along at least two axes, where touching is enough | the box itself |
+//! | at most two voxels along each axis | [`tiny`]: eight triangles at a time |
+//! | at most 64 voxels | [`rows`]: eight columns at a time |
+//! | larger | [`large`]: runs that follow lines |
+
+use fearless_simd::Simd;
+
+use super::number::SMALL_EXTENT;
+use super::rule::{Rule, SurfaceRule};
+use super::sink::Sink;
+use super::slabs::{Coordinate, Selected};
+use super::{large, rows, tiny};
+use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
+
+/// The voxel indices of a box, both ends included.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct VoxelBox {
+    pub(super) low: [i64; 3],
+    pub(super) high: [i64; 3],
+}
+
+impl VoxelBox {
+    /// The voxels whose closed cubes meet the triangle's closed bounding box.
+    #[inline(always)]
+    pub(super) fn around([a, b, c]: &[[i64; 3]; 3]) -> Self {
+        let low = |i: usize| (a[i].min(b[i]).min(c[i]) - 1) >> STEP_BITS;
+        let high = |i: usize| a[i].max(b[i]).max(c[i]) >> STEP_BITS;
+        Self { low: [low(0), low(1), low(2)], high: [high(0), high(1), high(2)] }
+    }
+
+    /// The part inside `other`, or `None` if there is none.
+    #[inline(always)]
+    fn clipped(&self, other: &Self) -> Option<Self> {
+        let low = |i: usize| self.low[i].max(other.low[i]);
+        let high = |i: usize| self.high[i].min(other.high[i]);
+        let (low, high) = ([low(0), low(1), low(2)], [high(0), high(1), high(2)]);
+        (low[0] <= high[0] && low[1] <= high[1] && low[2] <= high[2]).then_some(Self { low, high })
+    }
+
+    /// Voxels along each axis, less one.
+    #[inline(always)]
+    fn extent(&self) -> [i64; 3] {
+        [self.high[0] - self.low[0], self.high[1] - self.low[1], self.high[2] - self.low[2]]
+    }
+
+    /// Whether the box is inside `other`.
+    #[inline(always)]
+    fn is_inside(&self, other: &Self) -> bool {
+        (self.low[0] >= other.low[0])
+            & (self.low[1] >= other.low[1])
+            & (self.low[2] >= other.low[2])
+            & (self.high[0] <= other.high[0])
+            & (self.high[1] <= other.high[1])
+            & (self.high[2] <= other.high[2])
+    }
+}
+
+/// Buffers that one thread keeps between triangles.
+#[derive(Default)]
+struct Scratch {
+    rows: rows::Scratch,
+    large: large::Scratch,
+}
+
+/// Sends the voxels of a surface mode inside `clip` to `sink`.
+#[inline(always)]
+pub(super) fn surface<V: Simd, R: SurfaceRule, C: Coordinate>(
+    simd: V,
+    rule: &R,
+    triangles: Selected<'_, C>,
+    clip: &VoxelBox,
+    sink: &mut impl Sink,
+) {
+    let mut scratch = Scratch::default();
+    let mut cubes = tiny::Cubes::new();
+    let mut flats = tiny::Flats::new();
+    triangles.for_each(
+        #[inline(always)]
+        |triangle| {
+            let around = VoxelBox::around(triangle);
+            let extent = around.extent();
+            // 0 where no axis has an extent, 1 where no axis has more than 1.
+            if extent[0] | extent[1] | extent[2] <= 1 && around.is_inside(clip) {
+                let axes = extent[0] + extent[1] + extent[2];
+                if !R::TOUCH_IS_ENOUGH || axes == 3 {
+                    if cubes.push(triangle, around.low, extent) {
+                        simd.vectorize(
+                            #[inline(always)]
+                            || cubes.flush(simd, rule, sink),
+                        );
+                    }
+                } else if axes == 2 {
+                    if flats.push(triangle, around.low, extent) {
+                        simd.vectorize(
+                            #[inline(always)]
+                            || flats.flush(simd, rule, sink),
+                        );
+                    }
+                } else {
+                    // Strictly inside a row of one or two voxels, and connected: it meets them all.
+                    let bits = 1
+                        | extent[2].cast_unsigned() << 1
+                        | extent[1].cast_unsigned() << 2
+                        | extent[0].cast_unsigned() << 4;
+                    sink.cube(around.low, bits);
+                }
+                return;
+            }
+            let Some(clipped) = around.clipped(clip) else { return };
+            if R::TOUCH_IS_ENOUGH && extent[0].min(1) + extent[1].min(1) + extent[2].min(1) <= 1 {
+                // Strictly inside a row of voxels.
+                for x in clipped.low[0]..=clipped.high[0] {
+                    for y in clipped.low[1]..=clipped.high[1] {
+                        sink.run(x, y, clipped.low[2], clipped.high[2]);
+                    }
+                }
+                return;
+            }
+            by_size(simd, rule, triangle, &around, &clipped, sink, &mut scratch);
+        },
+    );
+    cubes.flush(simd, rule, sink);
+    flats.flush(simd, rule, sink);
+}
+
+/// Sends the voxels of a mode that looks along z from voxel centres to `sink`.
+///
+/// For [`super::rule::Solid`], the sink gets runs from the lowest voxel whose centre is not below the triangle to the top
+/// of the clip; a triangle below the clip gives whole columns.
+#[inline(always)]
+pub(super) fn centres<V: Simd, R: Rule, C: Coordinate>(
+    simd: V,
+    rule: &R,
+    triangles: Selected<'_, C>,
+    clip: &VoxelBox,
+    sink: &mut impl Sink,
+) {
+    const HALF: i64 = (STEPS_PER_VOXEL / 2) as i64;
+    let mut scratch = Scratch::default();
+    triangles.for_each(
+        #[inline(always)]
+        |triangle| {
+            let [a, b, c] = triangle;
+            // The columns whose centres are inside the closed box: for small triangles mostly none.
+            let low = |i: usize| (a[i].min(b[i]).min(c[i]) - HALF + (2 * HALF - 1)) >> STEP_BITS;
+            let high = |i: usize| (a[i].max(b[i]).max(c[i]) - HALF) >> STEP_BITS;
+            let columns = VoxelBox {
+                low: [low(0).max(clip.low[0]), low(1).max(clip.low[1]), clip.low[2]],
+                high: [high(0).min(clip.high[0]), high(1).min(clip.high[1]), clip.high[2]],
+            };
+            if columns.low[0] <= columns.high[0] && columns.low[1] <= columns.high[1] {
+                let around = VoxelBox::around(triangle);
+                by_size(simd, rule, triangle, &around, &columns, sink, &mut scratch);
+            }
+        },
+    );
+}
+
+/// The path for a triangle that is not tiny.
+#[inline(always)]
+fn by_size<V: Simd, R: Rule>(
+    simd: V,
+    rule: &R,
+    triangle: &[[i64; 3]; 3],
+    around: &VoxelBox,
+    clipped: &VoxelBox,
+    sink: &mut impl Sink,
+    scratch: &mut Scratch,
+) {
+    let extent = around.extent();
+    if extent[0].max(extent[1]).max(extent[2]) <= SMALL_EXTENT && rule.fits_small() {
+        simd.vectorize(
+            #[inline(always)]
+            || rows::voxelize(simd, rule, triangle, around, clipped, sink, &mut scratch.rows),
+        );
+    } else {
+        large::voxelize(rule, triangle, around, clipped, sink, &mut scratch.large);
+    }
+}
