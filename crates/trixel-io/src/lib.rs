@@ -5,6 +5,8 @@
 
 pub mod atomic_file;
 mod bits;
+mod extension;
+mod numbers;
 pub mod read;
 mod volume_format;
 pub mod volume_read;

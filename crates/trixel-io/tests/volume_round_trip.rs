@@ -291,7 +291,7 @@ fn lying_headers_take_no_memory() {
         .into_bytes()
     };
     refused("a.vti", &vti("", "<DataArray type=\"UInt8\" format=\"ascii\">1 1 1 1 1 1 1</DataArray>"), "cut short");
-    refused("b.vti", &vti("", "<DataArray type=\"UInt8\" format=\"ascii\">1 1 1 1 x 1 1 1</DataArray>"), "\"x\"");
+    refused("b.vti", &vti("", "<DataArray type=\"UInt8\" format=\"ascii\">1 1 1 1 x 1 1 1</DataArray>"), "`x`");
     refused("c.vti", &vti("Spacing=\"1 1 -1\"", ""), "voxel size");
     refused("d.vti", &vti("", "<DataArray type=\"String\" format=\"ascii\"/>"), "String");
     refused("e.vti", &vti("Direction=\"0 1 0 1 0 0 0 0 1\"", ""), "Direction");

@@ -26,7 +26,10 @@ mod transform;
 
 use std::path::{Path, PathBuf};
 
+pub(crate) use text::shown;
 use trixel::{Mesh, MeshError};
+
+use crate::extension;
 
 /// A mesh file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -72,8 +75,7 @@ impl MeshFormat {
     /// The format that a path's extension names, in any case.
     #[must_use]
     pub fn from_path(path: &Path) -> Option<Self> {
-        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
-        Self::ALL.into_iter().find(|format| format.extension() == extension)
+        Self::ALL.into_iter().find(|format| extension::matches(path, format.extension()))
     }
 }
 
@@ -114,8 +116,9 @@ pub enum ReadError {
     },
     /// No reader for this kind of file.
     #[error(
-        "{}: unknown mesh format; trixel reads .obj, .stl, .ply, .off, .gltf, .glb, .3mf and .dae",
-        path.display()
+        "{}: unknown mesh format; trixel reads {}",
+        path.display(),
+        extension::list(MeshFormat::ALL.map(MeshFormat::extension))
     )]
     UnknownFormat {
         /// The file.

@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 
 use trixel::{Grid, GridError, Volume, VolumeError};
 
-use crate::VolumeFormat;
 use crate::read::Problem;
+use crate::{VolumeFormat, extension};
 
 /// A volume and what was odd about its file.
 #[derive(Debug)]
@@ -55,7 +55,7 @@ pub enum VolumeReadError {
     #[error(
         "{}: not a volume format that trixel reads; it reads {}",
         path.display(),
-        VolumeFormat::list(VolumeFormat::ALL.into_iter().filter(|format| format.is_readable()))
+        extension::list(VolumeFormat::ALL.into_iter().filter(|f| f.is_readable()).map(VolumeFormat::extension))
     )]
     UnknownFormat {
         /// The file.

@@ -5,6 +5,7 @@
 use std::io::{self, Cursor, Read};
 
 use flate2::bufread::ZlibDecoder;
+use memchr::memmem::find;
 use roxmltree::{Document, Node};
 use trixel::{Grid, Volume};
 
@@ -22,10 +23,6 @@ struct Parts<'a> {
 
 fn damaged(at: &str, what: impl Into<String>) -> Failure {
     Failure::damaged(at, what)
-}
-
-fn find(bytes: &[u8], pattern: &[u8]) -> Option<usize> {
-    bytes.windows(pattern.len()).position(|window| window == pattern)
 }
 
 fn take_apart(bytes: &[u8]) -> Result<Parts<'_>, Failure> {

@@ -20,6 +20,7 @@ mod binvox;
 mod deflate;
 mod dense;
 mod glb;
+mod little_endian;
 mod npy_header;
 mod npz;
 mod nrrd;
@@ -42,6 +43,7 @@ pub use crate::volume_format::VolumeFormat;
 pub use npz::NpzWriter;
 
 use crate::atomic_file::AtomicFile;
+use crate::extension;
 
 /// How to write.
 #[derive(Clone, Copy)]
@@ -78,7 +80,7 @@ pub enum WriteError {
     #[error(
         "{}: unknown volume format; trixel writes {}",
         path.display(),
-        VolumeFormat::list(VolumeFormat::ALL)
+        extension::list(VolumeFormat::ALL.map(VolumeFormat::extension))
     )]
     UnknownFormat {
         /// The file.

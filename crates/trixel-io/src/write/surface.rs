@@ -130,9 +130,7 @@ fn z_faces(volume: &Volume, word: usize, positive: bool, found: &mut Vec<Rectang
                 };
                 *row = set & !beside;
             }
-            if square.iter().any(|&row| row != 0) {
-                transpose(&mut square);
-            }
+            transpose(&mut square);
             for (z, row) in square.into_iter().enumerate().take(layers) {
                 rows[z * row_words + group] = row;
             }
@@ -216,12 +214,6 @@ fn take_run(row: &mut [u64], first: usize, end: usize) -> bool {
 pub(super) fn coordinates(grid: &Grid) -> [Vec<f64>; 3] {
     let (origin, size) = (grid.origin(), grid.voxel_size());
     std::array::from_fn(|axis| (0..=grid.dims()[axis]).map(|i| origin[axis] + f64::from(i) * size[axis]).collect())
-}
-
-/// Rounds to single precision.
-#[expect(clippy::cast_possible_truncation, reason = "the rounding is the purpose; formats check the range")]
-pub(super) fn to_f32(value: f64) -> f32 {
-    value as f32
 }
 
 /// Rectangles with shared corners.

@@ -14,7 +14,9 @@ use std::ops::Range;
 
 use trixel::{Grid, UpAxis, Volume, WORD_BITS};
 
+use super::little_endian::put32;
 use super::{Failure, WriteOptions};
+use crate::numbers::spaced;
 
 /// Voxels of a model along an axis.
 const MODEL_SIDE: u32 = 256;
@@ -194,12 +196,11 @@ impl Scene<'_> {
     /// The chunks of the scene graph: a root transform, a group, and a transform and a shape for each model.
     fn graph(&self, parts: &[Part]) -> Vec<u8> {
         let grid = self.volume.grid();
-        let numbers = |values: [f64; 3]| values.map(|value| format!("{value:?}")).join(" ");
         let [nx, ny, nz] = grid.dims();
         // The editor ignores attributes it does not know.
         let attributes = [
-            ("trixel_origin", numbers(grid.origin())),
-            ("trixel_voxel_size", numbers(grid.voxel_size())),
+            ("trixel_origin", spaced(grid.origin())),
+            ("trixel_voxel_size", spaced(grid.voxel_size())),
             ("trixel_dims", format!("{nx} {ny} {nz}")),
         ];
         // At most 8^3 parts.
@@ -265,10 +266,6 @@ fn chunk_header(id: &[u8; 4], content: u64, children: u64) -> [u8; 12] {
     header[4..8].copy_from_slice(&content);
     header[8..].copy_from_slice(&children);
     header
-}
-
-fn put32(out: &mut Vec<u8>, value: u32) {
-    out.extend(value.to_le_bytes());
 }
 
 fn put_dictionary(out: &mut Vec<u8>, entries: &[(&str, String)]) {

@@ -21,6 +21,7 @@ use self::geometry::{Geometries, Geometry};
 use self::material::Materials;
 use super::assemble::{Assembly, Budget};
 use super::instances::{Child, walk};
+use super::text::without_byte_order_mark;
 use super::transform::Affine;
 use super::{Loaded, Problem, ReadOptions, Resources};
 
@@ -67,7 +68,7 @@ fn decode(bytes: &[u8]) -> Cow<'_, str> {
     match bytes {
         [0xff, 0xfe, ..] => Cow::Owned(words(false)),
         [0xfe, 0xff, ..] => Cow::Owned(words(true)),
-        _ => String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)),
+        _ => String::from_utf8_lossy(without_byte_order_mark(bytes)),
     }
 }
 
@@ -228,10 +229,4 @@ impl<'d> SceneReader<'d> {
         };
         symbols.iter().map(material).collect()
     }
-}
-
-/// Appends the triangles of a polygon of vertices, which name its corners by number: the fan around the first.
-fn triangulate_polygon(_positions: &[[f64; 3]], polygon: &[u32], out: &mut Vec<[u32; 3]>) {
-    let corners = u32::try_from(polygon.len()).unwrap_or(u32::MAX);
-    out.extend((2..corners).map(|corner| [0, corner - 1, corner]));
 }
