@@ -11,5 +11,6 @@ pub mod read;
 mod volume_format;
 pub mod volume_read;
 pub mod write;
+mod xml;
 
 pub use volume_format::VolumeFormat;

@@ -319,3 +319,17 @@ fn a_huge_sparse_grid_is_refused_within_the_limit() {
     assert!(matches!(read_volume(&path, Some(1 << 30)), Err(VolumeReadError::Memory { .. })));
     assert_eq!(read_grid(&path).unwrap().grid.dims(), [32_768; 3]);
 }
+
+/// Each level declares one more namespace, so that a reader which keeps for each element those in scope takes gigabytes.
+#[test]
+fn a_vti_of_nested_namespaces_is_refused_soon() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.vti");
+    let levels = 100_000;
+    let opened: String = (0..levels).map(|i| format!("<a xmlns:n{i}=\"u{i}\">")).collect();
+    fs::write(&path, format!("<VTKFile type=\"ImageData\">{opened}{}</VTKFile>", "</a>".repeat(levels))).unwrap();
+    let start = std::time::Instant::now();
+    let message = read_volume(&path, None).unwrap_err().to_string();
+    assert!(message.contains("no element ImageData"), "{message}");
+    assert!(start.elapsed().as_secs() < 5, "{:?}", start.elapsed());
+}

@@ -6,12 +6,12 @@ use std::rc::Rc;
 
 use trixel::Mesh;
 
-use super::dom::Element;
 use crate::numbers::narrow;
 use crate::read::Problem;
 use crate::read::assemble::{Budget, CornerAttribute, Part};
 use crate::read::color::linear;
 use crate::read::polygon::triangulate_corners;
+use crate::xml::Element;
 
 /// Sets of texture coordinates that are read.
 const MOST_UV_SETS: usize = 4;

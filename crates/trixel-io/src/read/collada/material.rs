@@ -4,10 +4,10 @@ use std::collections::HashMap;
 
 use trixel::{AlphaMode, Filter, Image, ImageSource, Material, Texture, TextureRef, Wrap};
 
-use super::dom::{Document, Element};
 use crate::numbers::narrow;
 use crate::read::Resources;
 use crate::read::color::linear;
+use crate::xml::{Document, Element};
 
 /// The materials that triangles have used so far.
 pub(super) struct Materials<'d> {

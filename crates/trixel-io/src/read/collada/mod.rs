@@ -3,7 +3,6 @@
 //! Units and the up axis are kept as the file has them, only named in [`Mesh::up`](trixel::Mesh::up). Skinned meshes are
 //! read in their bind shape, morphed ones in their base shape; references to other documents are not followed.
 
-mod dom;
 mod geometry;
 mod material;
 mod node;
@@ -16,7 +15,6 @@ use std::rc::Rc;
 
 use trixel::{Mesh, UpAxis};
 
-use self::dom::{Document, Element};
 use self::geometry::{Geometries, Geometry};
 use self::material::Materials;
 use super::assemble::{Assembly, Budget};
@@ -24,6 +22,7 @@ use super::instances::{Child, walk};
 use super::text::without_byte_order_mark;
 use super::transform::Affine;
 use super::{Loaded, Problem, ReadOptions, Resources};
+use crate::xml::{Document, Element};
 
 /// Reads COLLADA.
 pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resources) -> Result<Loaded, Problem> {
