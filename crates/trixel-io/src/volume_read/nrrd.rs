@@ -162,12 +162,12 @@ fn read_header(reader: &mut impl BufRead) -> Result<Header, Failure> {
     }
 }
 
-pub(super) fn grid(mut input: Input) -> Result<LoadedGrid, Failure> {
+pub(super) fn grid(mut input: Input<'_>) -> Result<LoadedGrid, Failure> {
     let header = read_header(&mut input.reader)?;
     Ok(LoadedGrid { grid: header.grid, warnings: header.warnings })
 }
 
-pub(super) fn volume(mut input: Input, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
+pub(super) fn volume(mut input: Input<'_>, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
     let Header { grid, encoding, bytes, warnings } = read_header(&mut input.reader)?;
     let ratio = if encoding == Encoding::Gzip { DEFLATE_RATIO } else { 1 };
     check_backing(input.bytes.saturating_sub(bytes), ratio, grid.voxel_count())?;

@@ -121,7 +121,7 @@ fn element(kind: &str, big_endian: bool) -> Result<Element, Failure> {
     })
 }
 
-pub(super) fn grid(mut input: Input) -> Result<LoadedGrid, Failure> {
+pub(super) fn grid(mut input: Input<'_>) -> Result<LoadedGrid, Failure> {
     let mut bytes = Vec::new();
     input.reader.read_to_end(&mut bytes)?;
     let parts = take_apart(&bytes)?;
@@ -130,7 +130,7 @@ pub(super) fn grid(mut input: Input) -> Result<LoadedGrid, Failure> {
     Ok(LoadedGrid { grid, warnings: Vec::new() })
 }
 
-pub(super) fn volume(mut input: Input, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
+pub(super) fn volume(mut input: Input<'_>, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
     let mut bytes = Vec::new();
     input.reader.read_to_end(&mut bytes)?;
     let parts = take_apart(&bytes)?;
