@@ -139,8 +139,10 @@ fn z_faces(volume: &Volume, word: usize, positive: bool, found: &mut Vec<Rectang
     let slices: Vec<Vec<Rectangle>> = (0..layers)
         .into_par_iter()
         .map(|z| {
-            let row = |rows: &[u64]| rows[z * row_words..(z + 1) * row_words].to_vec();
-            let mut mask: Vec<u64> = slab.chunks(row_length).flat_map(row).collect();
+            let mut mask = Vec::with_capacity(nx as usize * row_words);
+            for rows in slab.chunks(row_length) {
+                mask.extend(&rows[z * row_words..(z + 1) * row_words]);
+            }
             // At most `Grid::MAX_DIM`.
             let plane = u32::try_from(first + z).unwrap_or(u32::MAX) + u32::from(positive);
             let mut found = Vec::new();
