@@ -12,14 +12,13 @@ mod nrrd;
 mod raw;
 mod vti;
 
-use std::fs::File;
 use std::io::{self, BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use trixel::{Grid, GridError, Volume, VolumeError};
 
-use crate::read::Problem;
-use crate::{VolumeFormat, extension};
+use crate::read::{Problem, empty_file};
+use crate::{VolumeFormat, extension, open};
 
 /// A volume and what was odd about its file.
 #[derive(Debug)]
@@ -161,12 +160,8 @@ impl<'a> Input<'a> {
     }
 
     fn open(path: &Path) -> io::Result<Self> {
-        let file = File::open(path)?;
-        let metadata = file.metadata()?;
-        if metadata.is_dir() {
-            return Err(io::Error::from(io::ErrorKind::IsADirectory));
-        }
-        Ok(Self::new(file, metadata.len()))
+        let (file, bytes) = open::open(path)?;
+        Ok(Self::new(file, bytes))
     }
 }
 
@@ -177,7 +172,7 @@ impl<'a> Input<'a> {
 /// When the file cannot be read, is of no format that is read, is damaged, uses a part of its format that is not
 /// supported (which is then named), or needs more memory than there is.
 pub fn read_volume(path: &Path, memory_limit: Option<u64>) -> Result<LoadedVolume, VolumeReadError> {
-    let (format, input) = open(path)?;
+    let (format, input) = open_volume(path)?;
     read(format, path, input, || sidecar_of(path), memory_limit)
 }
 
@@ -217,6 +212,7 @@ fn read<'a>(
     sidecar: impl FnOnce() -> raw::Sidecar<'a>,
     memory_limit: Option<u64>,
 ) -> Result<LoadedVolume, VolumeReadError> {
+    check_not_empty(path, &input)?;
     match format {
         VolumeFormat::Npz => npz::volume(input, memory_limit),
         VolumeFormat::Npy => npy::volume(input, memory_limit),
@@ -242,7 +238,8 @@ fn sidecar_of(path: &Path) -> raw::Sidecar<'static> {
 /// # Errors
 /// As [`read_volume`], as far as the header tells.
 pub fn read_grid(path: &Path) -> Result<LoadedGrid, VolumeReadError> {
-    let (format, input) = open(path)?;
+    let (format, input) = open_volume(path)?;
+    check_not_empty(path, &input)?;
     match format {
         VolumeFormat::Npz => npz::grid(input),
         VolumeFormat::Npy => npy::grid(input),
@@ -257,12 +254,19 @@ pub fn read_grid(path: &Path) -> Result<LoadedGrid, VolumeReadError> {
     .map_err(|failure| failure.at(path))
 }
 
-fn open(path: &Path) -> Result<(VolumeFormat, Input<'static>), VolumeReadError> {
+fn open_volume(path: &Path) -> Result<(VolumeFormat, Input<'static>), VolumeReadError> {
     let Some(format) = VolumeFormat::from_path(path).filter(|format| format.is_readable()) else {
         return Err(VolumeReadError::UnknownFormat { path: path.to_owned() });
     };
     let input = Input::open(path).map_err(|source| VolumeReadError::Io { path: path.to_owned(), source })?;
     Ok((format, input))
+}
+
+fn check_not_empty(path: &Path, input: &Input<'_>) -> Result<(), VolumeReadError> {
+    if input.bytes == 0 {
+        return Err(VolumeReadError::Damaged { path: path.to_owned(), problem: empty_file() });
+    }
+    Ok(())
 }
 
 /// Dimensions as the grid takes them.

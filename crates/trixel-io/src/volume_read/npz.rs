@@ -17,7 +17,7 @@ impl From<ZipError> for Failure {
     fn from(error: ZipError) -> Self {
         match error {
             ZipError::Io(error) => error.into(),
-            error => Self::damaged("archive", error.to_string()),
+            error => Self::damaged("archive", format!("{error}; the file was cut short or is not a NumPy archive")),
         }
     }
 }
