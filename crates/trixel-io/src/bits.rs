@@ -76,6 +76,10 @@ fn nonzero_mask(bytes: u64) -> u8 {
 /// Transposes a 64 x 64 bit matrix: bit j of word i becomes bit i of word j. Swaps the off-diagonal blocks of ever
 /// smaller squares.
 pub(crate) fn transpose(matrix: &mut [u64; WORD]) {
+    // Most of a typical grid is empty.
+    if matrix.iter().all(|&row| row == 0) {
+        return;
+    }
     let mut width = WORD / 2;
     let mut mask = u64::from(u32::MAX);
     while width != 0 {

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use crate::extension;
+
 /// A volume file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VolumeFormat {
@@ -66,8 +68,7 @@ impl VolumeFormat {
     /// The format that a path's extension names, in any case.
     #[must_use]
     pub fn from_path(path: &Path) -> Option<Self> {
-        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
-        Self::ALL.into_iter().find(|format| format.extension() == extension)
+        Self::ALL.into_iter().find(|format| extension::matches(path, format.extension()))
     }
 
     /// Whether [`crate::volume_read`] reads the format back: those that hold voxels rather than faces, except `.vox`,
@@ -77,15 +78,6 @@ impl VolumeFormat {
         match self {
             Self::Npz | Self::Npy | Self::Binvox | Self::Vti | Self::Nrrd | Self::Raw => true,
             Self::Vox | Self::Obj | Self::Ply | Self::Stl | Self::Glb => false,
-        }
-    }
-
-    /// `.a, .b and .c`, for messages.
-    pub(crate) fn list(formats: impl IntoIterator<Item = Self>) -> String {
-        let names: Vec<_> = formats.into_iter().map(|format| format!(".{}", format.extension())).collect();
-        match names.split_last() {
-            Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
-            _ => names.concat(),
         }
     }
 }

@@ -4,6 +4,9 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, clippy::panic, reason = "a failure here is a failed test")]
 
+#[path = "common/models.rs"]
+mod models;
+
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -11,13 +14,6 @@ use trixel::conformance::{oracle, suite};
 use trixel::lattice::LatticeMesh;
 use trixel::{CpuBackend, Grid, Job, Mesh, Mode};
 use trixel_io::read::{MeshFormat, ReadOptions, read_mesh};
-
-/// The folder of meshes: `TRIXEL_MODELS`, or `shared/models` beside the workspace.
-fn models() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/models");
-    let folder = std::env::var_os("TRIXEL_MODELS").map_or_else(beside, PathBuf::from);
-    folder.is_dir().then_some(folder)
-}
 
 fn mesh_files(folder: &Path, files: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -31,10 +27,7 @@ fn mesh_files(folder: &Path, files: &mut Vec<PathBuf>) {
 }
 
 fn load_all() -> Option<Vec<(String, Mesh)>> {
-    let Some(folder) = models() else {
-        println!("skipped: there is no folder shared/models beside the workspace and TRIXEL_MODELS is not set");
-        return None;
-    };
+    let folder = models::models_folder()?;
     let mut files = Vec::new();
     mesh_files(&folder, &mut files);
     files.sort();

@@ -291,7 +291,7 @@ fn lying_headers_take_no_memory() {
         .into_bytes()
     };
     refused("a.vti", &vti("", "<DataArray type=\"UInt8\" format=\"ascii\">1 1 1 1 1 1 1</DataArray>"), "cut short");
-    refused("b.vti", &vti("", "<DataArray type=\"UInt8\" format=\"ascii\">1 1 1 1 x 1 1 1</DataArray>"), "\"x\"");
+    refused("b.vti", &vti("", "<DataArray type=\"UInt8\" format=\"ascii\">1 1 1 1 x 1 1 1</DataArray>"), "`x`");
     refused("c.vti", &vti("Spacing=\"1 1 -1\"", ""), "voxel size");
     refused("d.vti", &vti("", "<DataArray type=\"String\" format=\"ascii\"/>"), "String");
     refused("e.vti", &vti("Direction=\"0 1 0 1 0 0 0 0 1\"", ""), "Direction");
@@ -318,4 +318,49 @@ fn a_huge_sparse_grid_is_refused_within_the_limit() {
     npz.finish().unwrap();
     assert!(matches!(read_volume(&path, Some(1 << 30)), Err(VolumeReadError::Memory { .. })));
     assert_eq!(read_grid(&path).unwrap().grid.dims(), [32_768; 3]);
+}
+
+/// Each level declares one more namespace, so that a reader which keeps for each element those in scope takes gigabytes.
+#[test]
+fn a_vti_of_nested_namespaces_is_refused_soon() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.vti");
+    let levels = 100_000;
+    let opened: String = (0..levels).map(|i| format!("<a xmlns:n{i}=\"u{i}\">")).collect();
+    fs::write(&path, format!("<VTKFile type=\"ImageData\">{opened}{}</VTKFile>", "</a>".repeat(levels))).unwrap();
+    let start = std::time::Instant::now();
+    let message = read_volume(&path, None).unwrap_err().to_string();
+    assert!(message.contains("no element ImageData"), "{message}");
+    assert!(start.elapsed().as_secs() < 5, "{:?}", start.elapsed());
+}
+
+/// Column-major indices keep two columns until the third comes: deflated zeros would make gigabytes of a few megabytes.
+#[test]
+fn column_major_indices_count_against_the_limit() {
+    use std::io::Write;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    let rows = 1 << 16;
+    for fortran in ["False", "True"] {
+        let mut archive = zip::ZipWriter::new(fs::File::create(&path).unwrap());
+        let mut array = |name: &str, dtype: &str, shape: &str, bytes: &[u8]| {
+            let header = format!("{{'descr': '{dtype}', 'fortran_order': {fortran}, 'shape': ({shape})}}\n");
+            archive.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
+            archive.write_all(b"\x93NUMPY\x01\x00").unwrap();
+            archive.write_all(&u16::try_from(header.len()).unwrap().to_le_bytes()).unwrap();
+            archive.write_all(header.as_bytes()).unwrap();
+            archive.write_all(bytes).unwrap();
+        };
+        array("indices.npy", "<i4", &format!("{rows}, 3"), &vec![0; rows * 12]);
+        array("dims.npy", "|u1", "3,", &[4; 3]);
+        array("origin.npy", "<f8", "3,", &[0; 24]);
+        array("voxel_size.npy", "|u1", "3,", &[1; 3]);
+        archive.finish().unwrap();
+        assert_eq!(read_volume(&path, Some(1 << 20)).unwrap().volume.count(), 1);
+        let small = read_volume(&path, Some(1 << 18));
+        match fortran {
+            "True" => assert!(matches!(small, Err(VolumeReadError::Memory { .. }))),
+            _ => assert_eq!(small.unwrap().volume.count(), 1, "rows that are not kept take no memory"),
+        }
+    }
 }

@@ -4,6 +4,7 @@ use trixel::{Attribute, Mesh};
 
 use super::Problem;
 use super::transform::Affine;
+use crate::numbers::narrow;
 
 /// How large a mesh a file may stand for: instances let a few bytes ask for any number of vertices.
 #[derive(Clone, Copy, Debug)]
@@ -192,6 +193,37 @@ struct Placed<'a> {
     flip: bool,
 }
 
+/// An attribute with values of its own on corners, whose triangles are added in order; some may have none.
+pub(super) struct CornerAttribute<T> {
+    pub(super) values: Vec<T>,
+    corners: Vec<[u32; 3]>,
+}
+
+impl<T> Default for CornerAttribute<T> {
+    fn default() -> Self {
+        Self { values: Vec::new(), corners: Vec::new() }
+    }
+}
+
+impl<T: Copy> CornerAttribute<T> {
+    /// Sets the corners of `triangle`, which is later than those before.
+    pub(super) fn push(&mut self, triangle: usize, corners: [u32; 3]) {
+        if corners != [Attribute::<T>::NONE; 3] {
+            self.corners.resize(triangle, [Attribute::<T>::NONE; 3]);
+            self.corners.push(corners);
+        }
+    }
+
+    /// The attribute of `triangles` triangles, if any of them has it.
+    pub(super) fn finish(mut self, triangles: usize) -> Option<Attribute<T>> {
+        if self.corners.is_empty() {
+            return None;
+        }
+        self.corners.resize(triangles, [Attribute::<T>::NONE; 3]);
+        Some(Attribute { values: self.values, corners: Some(self.corners) })
+    }
+}
+
 /// One attribute of all parts. It stays one value a vertex for as long as every part has it so.
 #[derive(Debug)]
 struct Gathered<T> {
@@ -260,17 +292,6 @@ fn unit_normal(matrix: &[[f64; 3]; 3], normal: [f32; 3]) -> [f32; 3] {
     let scaled = mapped.map(|c| c / largest);
     let length = scaled.iter().map(|c| c * c).sum::<f64>().sqrt();
     scaled.map(|c| narrow(c / length))
-}
-
-/// An attribute's value in the precision it is kept in.
-#[allow(clippy::cast_possible_truncation, reason = "attributes are f32; positions never pass here")]
-pub(super) fn narrow(value: f64) -> f32 {
-    value as f32
-}
-
-/// The linear value of an sRGB component, 0 to 1 (IEC 61966-2-1).
-pub(super) fn linear_from_srgb(component: f32) -> f32 {
-    if component <= 0.040_45 { component / 12.92 } else { ((component + 0.055) / 1.055).powf(2.4) }
 }
 
 #[cfg(test)]
@@ -374,12 +395,5 @@ mod tests {
         let problem = assembly.place(&triangle(None), &Affine::IDENTITY, |m| m).unwrap_err();
         assert!(problem.what.contains("more than 5 vertices"), "{problem}");
         assert_eq!(Budget::for_bytes(usize::MAX).limit(), 1 << 28);
-    }
-
-    #[test]
-    fn srgb_ends_are_exact() {
-        assert_eq!(linear_from_srgb(0.0), 0.0);
-        assert_eq!(linear_from_srgb(1.0), 1.0);
-        assert!((linear_from_srgb(0.5) - 0.214_041).abs() < 1e-6);
     }
 }

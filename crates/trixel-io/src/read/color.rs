@@ -2,7 +2,7 @@
 
 use trixel::Attribute;
 
-use super::text::narrow;
+use crate::numbers::narrow;
 
 /// Vertex colours of a file, in sRGB, by vertex; the scale (0 to 1, or 0 to 255) is only known once all are read.
 #[derive(Default)]
@@ -63,8 +63,13 @@ impl VertexColors {
 }
 
 /// The linear value of an sRGB component (IEC 61966-2-1), both 0 to 1.
-pub(super) fn srgb_to_linear(c: f32) -> f32 {
+fn srgb_to_linear(c: f32) -> f32 {
     if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+}
+
+/// The linear colour of an sRGB one, from 0 to 1; alpha is linear always.
+pub(super) fn linear([r, g, b, a]: [f32; 4]) -> [f32; 4] {
+    [srgb_to_linear(r), srgb_to_linear(g), srgb_to_linear(b), a]
 }
 
 #[cfg(test)]
@@ -85,6 +90,12 @@ mod tests {
             assert!((a - b).abs() < 1e-6, "{bytes:?} {fractions:?}");
         }
         assert!((bytes[1] - 0.033_105).abs() < 1e-5, "0.2 in sRGB is 0.0331 in linear light");
+    }
+
+    #[test]
+    fn srgb_ends_are_exact_and_alpha_stays() {
+        assert_eq!(linear([0.0, 1.0, 0.0, 0.5]), [0.0, 1.0, 0.0, 0.5]);
+        assert!((linear([0.5; 4])[2] - 0.214_041).abs() < 1e-6);
     }
 
     #[test]

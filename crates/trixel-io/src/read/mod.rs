@@ -1,5 +1,17 @@
 //! Mesh readers: one file a format, all behind [`read_mesh`].
 //!
+//! | format | what is read |
+//! |---|---|
+//! | OBJ | n-gons, negative indices, vertex colours (also with alpha), normals, texture coordinates; MTL libraries beside it |
+//! | STL | ASCII and binary |
+//! | PLY | ASCII and both byte orders, any scalar type, polygons, tristrips, colours, normals, texture coordinates |
+//! | OFF | ASCII, with normals (N), vertex colours (C) and texture coordinates (ST) |
+//! | glTF, GLB | nodes, instances, strips and fans, sparse and quantized accessors, morph weights; data URIs, files beside it |
+//! | 3MF | components, build transforms, the production and materials extensions |
+//! | COLLADA | nodes, instances, skins and morphs in their bind or base shape, polygons, strips and fans, common materials |
+//!
+//! Positions are `f64` as the file has them: units and the up axis are not applied, only named in [`Mesh::up`].
+//!
 //! A reader takes the whole file as bytes and gives a [`Mesh`] whose indices are in range and whose used positions are
 //! finite, or one [`ReadError`]. It allocates in proportion to the bytes it was given, never to a count that the file
 //! merely claims.
@@ -24,9 +36,14 @@ mod text;
 mod threemf;
 mod transform;
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
+pub(crate) use text::shown;
 use trixel::{Mesh, MeshError};
+
+use crate::open::open;
+use crate::{VolumeFormat, extension};
 
 /// A mesh file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -72,8 +89,7 @@ impl MeshFormat {
     /// The format that a path's extension names, in any case.
     #[must_use]
     pub fn from_path(path: &Path) -> Option<Self> {
-        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
-        Self::ALL.into_iter().find(|format| format.extension() == extension)
+        Self::ALL.into_iter().find(|format| extension::matches(path, format.extension()))
     }
 }
 
@@ -114,8 +130,9 @@ pub enum ReadError {
     },
     /// No reader for this kind of file.
     #[error(
-        "{}: unknown mesh format; trixel reads .obj, .stl, .ply, .off, .gltf, .glb, .3mf and .dae",
-        path.display()
+        "{}: unknown mesh format; trixel reads {}: export the mesh as one of them",
+        path.display(),
+        extension::list(MeshFormat::ALL.map(MeshFormat::extension))
     )]
     UnknownFormat {
         /// The file.
@@ -129,8 +146,24 @@ pub enum ReadError {
         /// Where and what.
         problem: Problem,
     },
+    /// The file holds another format than its extension says.
+    #[error("{}: the file is not .{} but .{} by its content; rename it", path.display(), named.extension(), found.extension())]
+    WrongExtension {
+        /// The file.
+        path: PathBuf,
+        /// The format that the extension names.
+        named: MeshFormat,
+        /// The format that the first bytes are of.
+        found: MeshFormat,
+    },
+    /// The file is one of voxels.
+    #[error("{}: this is a volume, and a mesh is wanted here: its voxels are there already", path.display())]
+    IsVolume {
+        /// The file.
+        path: PathBuf,
+    },
     /// There is no triangle in the file.
-    #[error("{}: no triangles in this file", path.display())]
+    #[error("{}: there is no triangle in this file; points and curves alone have no surface", path.display())]
     Empty {
         /// The file.
         path: PathBuf,
@@ -172,22 +205,44 @@ pub(crate) trait Resources {
 ///
 /// ```
 /// use trixel_io::read::{ReadOptions, read_mesh};
-/// let path = std::env::temp_dir().join(format!("trixel-doc-{}.off", std::process::id()));
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("triangle.off");
 /// std::fs::write(&path, "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")?;
 /// let loaded = read_mesh(&path, &ReadOptions::default())?;
 /// assert_eq!(loaded.mesh.triangles, [[0, 1, 2]]);
 /// assert!(loaded.warnings.is_empty());
-/// # std::fs::remove_file(&path)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn read_mesh(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
-    let bytes = std::fs::read(path).map_err(|source| ReadError::Io { path: path.to_owned(), source })?;
-    let format = MeshFormat::from_path(path).or_else(|| sniff::format_of(&bytes));
-    match format {
-        Some(format) => read_bytes(format, path, &bytes, options, &directory::Directory::of(path)),
+    let bytes = load(path).map_err(|source| ReadError::Io { path: path.to_owned(), source })?;
+    let resources = directory::Directory::of(path);
+    let read = |format| read_bytes(format, path, &bytes, options, &resources);
+    if let Some(named) = MeshFormat::from_path(path) {
+        return read(named).map_err(|error| match sniff::format_of(&bytes) {
+            // Both have one reader.
+            Some(found) if found != named && [found, named] != [MeshFormat::Glb, MeshFormat::Gltf] => {
+                ReadError::WrongExtension { path: path.to_owned(), named, found }
+            }
+            _ => error,
+        });
+    }
+    if VolumeFormat::from_path(path).is_some_and(VolumeFormat::is_readable) {
+        return Err(ReadError::IsVolume { path: path.to_owned() });
+    }
+    match sniff::format_of(&bytes) {
+        Some(format) => read(format),
         None if bytes.is_empty() => Err(damaged(path, empty_file())),
         None => Err(ReadError::UnknownFormat { path: path.to_owned() }),
     }
+}
+
+fn load(path: &Path) -> std::io::Result<Vec<u8>> {
+    let (mut file, length) = open(path)?;
+    // The length is a hint only, and may not even fit the memory.
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(usize::try_from(length).unwrap_or(usize::MAX))?;
+    file.read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// Reads a mesh from the bytes of a file of a known format, where there is no file system or none to be trusted.
@@ -212,6 +267,10 @@ fn read_bytes(
 ) -> Result<Loaded, ReadError> {
     if bytes.is_empty() {
         return Err(damaged(path, empty_file()));
+    }
+    if bytes.starts_with(b"version https://git-lfs.") {
+        let what = "this is Git LFS's pointer to the file, not the file itself; fetch it with `git lfs pull`";
+        return Err(damaged(path, Problem::new("start", what)));
     }
     let read = match format {
         MeshFormat::Obj => obj::read,
@@ -245,7 +304,7 @@ fn damaged(path: &Path, problem: Problem) -> ReadError {
     ReadError::Damaged { path: path.to_owned(), problem }
 }
 
-fn empty_file() -> Problem {
+pub(crate) fn empty_file() -> Problem {
     Problem::new("start", "the file is empty (0 bytes)")
 }
 

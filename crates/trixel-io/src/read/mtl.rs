@@ -4,8 +4,9 @@ use std::collections::HashMap;
 
 use trixel::{AlphaMode, Filter, Image, ImageSource, Material, Mesh, Texture, TextureRef, Wrap};
 
-use super::text::{Scanner, narrow, shown};
+use super::text::{Scanner, shown};
 use super::{Resources, warn_of};
+use crate::numbers::narrow;
 
 /// More materials than any real file has; a material is many times larger than its line in a file.
 pub(super) const MOST_MATERIALS: usize = 65_536;

@@ -11,8 +11,9 @@ use trixel::{Attribute, Mesh};
 use super::color::{Scale, VertexColors};
 use super::mtl::{MOST_MATERIALS, Materials};
 use super::polygon::{Faces, fan};
-use super::text::{self, Scanner, line_at, narrow, shown};
+use super::text::{self, Scanner, line_at, shown};
 use super::{Loaded, Problem, ReadOptions, Resources, warn_of};
+use crate::numbers::narrow;
 
 /// More material libraries than any real file names; each costs a look into the folder, and may be as large as it likes.
 const MOST_LIBRARIES: usize = 256;

@@ -7,8 +7,9 @@ use trixel::{Attribute, Mesh};
 
 use super::color::{Scale, VertexColors};
 use super::polygon::Faces;
-use super::text::{self, Scanner, narrow};
+use super::text::{self, Scanner};
 use super::{Loaded, Problem, ReadOptions, Resources};
+use crate::numbers::narrow;
 
 /// What a vertex has besides its position, as letters in front of `OFF` say.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

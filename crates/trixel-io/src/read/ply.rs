@@ -8,8 +8,9 @@ use trixel::{Attribute, Image, ImageSource, Material, Mesh, Texture, TextureRef}
 use super::color::{Scale, VertexColors};
 use super::ply_header::{Element, Encoding, Header, Kind, Property, Scalar};
 use super::polygon::{Faces, fan};
-use super::text::{self, Scanner, narrow, shown};
+use super::text::{self, Scanner, shown};
 use super::{Loaded, Problem, ReadOptions, Resources, warn_of};
+use crate::numbers::narrow;
 
 pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resources) -> Result<Loaded, Problem> {
     let bytes = text::without_byte_order_mark(bytes);

@@ -9,19 +9,8 @@
 //! bridged by doubled edges, as exporters write them, work. The work is bounded in proportion to the corners, so a
 //! hostile polygon ends as a partial fan, not as a hang.
 
-/// Appends the triangles of `polygon`, which names its corners by their vertices.
-#[allow(dead_code, reason = "for formats that know all positions before their polygons, such as COLLADA")]
-pub(super) fn triangulate(positions: &[[f64; 3]], polygon: &[u32], out: &mut Vec<[u32; 3]>) {
-    let start = out.len();
-    triangulate_corners(positions, polygon, out);
-    // Corner numbers are below the polygon's length.
-    for corner in out[start..].iter_mut().flatten() {
-        *corner = polygon[*corner as usize];
-    }
-}
-
-/// As [`triangulate`], but names corners by their number in `polygon`, so that attributes can follow.
-#[allow(dead_code, reason = "for formats that know all positions before their polygons, such as COLLADA")]
+/// Appends the triangles of `polygon`, which names its vertices, as numbers of its corners, so that attributes can
+/// follow. For formats that know all positions before their polygons; the others push to [`Faces`].
 pub(super) fn triangulate_corners(positions: &[[f64; 3]], polygon: &[u32], out: &mut Vec<[u32; 3]>) {
     let Some(outline) = Outline::concave(positions, polygon) else {
         let corners = u32::try_from(polygon.len()).unwrap_or(u32::MAX);
@@ -320,7 +309,7 @@ mod tests {
     fn check(points: &[[f64; 2]], expected_area: f64) -> Vec<[u32; 3]> {
         let (positions, polygon) = flat(points);
         let mut triangles = Vec::new();
-        triangulate(&positions, &polygon, &mut triangles);
+        triangulate_corners(&positions, &polygon, &mut triangles);
         assert_eq!(triangles.len(), points.len() - 2);
         let areas: Vec<f64> = triangles.iter().map(|&t| area(points, t)).collect();
         assert!(areas.iter().all(|&a| a >= 0.0), "{triangles:?} {areas:?}");
@@ -342,7 +331,7 @@ mod tests {
         let bent = [[0.0, 0.0], [0.5, 1e-9], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
         let (positions, polygon) = flat(&bent);
         let mut triangles = Vec::new();
-        triangulate(&positions, &polygon, &mut triangles);
+        triangulate_corners(&positions, &polygon, &mut triangles);
         assert_eq!(triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
     }
 
@@ -350,7 +339,7 @@ mod tests {
     fn saddle_quads_are_fans() {
         let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.3], [1.0, 1.0, 0.0], [0.0, 1.0, 0.3]];
         let mut triangles = Vec::new();
-        triangulate(&positions, &[0, 1, 2, 3], &mut triangles);
+        triangulate_corners(&positions, &[0, 1, 2, 3], &mut triangles);
         assert_eq!(triangles, [[0, 1, 2], [0, 2, 3]]);
     }
 
@@ -378,7 +367,7 @@ mod tests {
         comb.remove(0);
         let (positions, polygon) = flat(&comb);
         let mut triangles = Vec::new();
-        triangulate(&positions, &polygon, &mut triangles);
+        triangulate_corners(&positions, &polygon, &mut triangles);
         let sum: f64 = triangles.iter().map(|&t| area(&comb, t)).sum();
         let whole: f64 = triangulated_area(&comb);
         assert!((sum - whole).abs() < 1e-6 * whole);
@@ -418,7 +407,7 @@ mod tests {
                 })
                 .collect();
             let mut triangles = Vec::new();
-            triangulate(&positions, &(0..10).collect::<Vec<u32>>(), &mut triangles);
+            triangulate_corners(&positions, &(0..10).collect::<Vec<u32>>(), &mut triangles);
             let sum: f64 = triangles.iter().map(|&t| area(&star, t)).sum();
             assert!((sum - triangulated_area(&star)).abs() < 1e-9, "axis {axis}");
         }
@@ -435,7 +424,7 @@ mod tests {
         let (positions, polygon) = flat(&points);
         let mut triangles = Vec::new();
         let start = std::time::Instant::now();
-        triangulate(&positions, &polygon, &mut triangles);
+        triangulate_corners(&positions, &polygon, &mut triangles);
         assert_eq!(triangles.len(), points.len() - 2);
         assert!(start.elapsed().as_secs() < 5, "{:?}", start.elapsed());
     }
@@ -445,7 +434,7 @@ mod tests {
         let positions = [[f64::NAN; 3], [1e308; 3], [-1e308; 3], [0.0; 3]];
         for polygon in [&[0, 1, 2, 3][..], &[9, 9, 9, 9], &[3, 3, 3, 3], &[], &[1], &[1, 2]] {
             let mut triangles = Vec::new();
-            triangulate(&positions, polygon, &mut triangles);
+            triangulate_corners(&positions, polygon, &mut triangles);
             assert_eq!(triangles.len(), polygon.len().saturating_sub(2));
         }
     }

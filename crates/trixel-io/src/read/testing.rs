@@ -3,11 +3,14 @@
 
 use std::collections::HashMap;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use trixel::Mesh;
 
 use super::{Loaded, Problem, ReadOptions, Resources};
+
+#[path = "../../tests/common/models.rs"]
+mod models;
 
 /// A reader under test.
 pub(super) type Reader = fn(&[u8], &ReadOptions, &dyn Resources) -> Result<Loaded, Problem>;
@@ -47,13 +50,9 @@ impl Resources for Folder {
 
 /// Reads one of the real meshes, or prints why it cannot and returns `None`.
 pub(super) fn read_model(name: &str, reader: Reader, options: &ReadOptions) -> Option<Loaded> {
-    let folder = match std::env::var_os("TRIXEL_MODELS") {
-        Some(folder) => PathBuf::from(folder),
-        None => Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/models"),
-    };
-    let path = folder.join(name);
+    let path = models::models_folder()?.join(name);
     let Ok(bytes) = std::fs::read(&path) else {
-        println!("skipped: {} is not there (set TRIXEL_MODELS to the folder of the real meshes)", path.display());
+        println!("skipped: {} is not there", path.display());
         return None;
     };
     let resources = Folder(path.parent().unwrap().to_owned());

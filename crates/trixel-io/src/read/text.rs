@@ -175,7 +175,7 @@ pub(super) fn line_at(bytes: &[u8], offset: usize) -> String {
 }
 
 /// A word or name from the file as text for a message or a name: replaced where not UTF-8, cut where absurdly long.
-pub(super) fn shown(word: &[u8]) -> String {
+pub(crate) fn shown(word: &[u8]) -> String {
     const LONGEST: usize = 200;
     let mut text = String::from_utf8_lossy(&word[..word.len().min(LONGEST)]).into_owned();
     if word.len() > LONGEST {
@@ -187,12 +187,6 @@ pub(super) fn shown(word: &[u8]) -> String {
 /// The text behind a UTF-8 byte order mark, which some exporters write.
 pub(super) fn without_byte_order_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
-}
-
-/// The nearest `f32`: shading data needs no more.
-#[expect(clippy::cast_possible_truncation, reason = "rounds to nearest, overflow becomes infinite")]
-pub(super) fn narrow(value: f64) -> f32 {
-    value as f32
 }
 
 #[cfg(test)]

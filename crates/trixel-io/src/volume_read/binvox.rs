@@ -15,7 +15,7 @@ const MAX_HEADER: u64 = 1 << 12;
 /// A pair of bytes is a run of at most 255 voxels.
 const VOXELS_PER_PAIR: u64 = 255;
 
-fn read_header(input: &mut Input) -> Result<Grid, Failure> {
+fn read_header(input: &mut Input<'_>) -> Result<Grid, Failure> {
     let damaged = |what: String| Failure::damaged("header", what);
     let mut reader = (&mut input.reader).take(MAX_HEADER);
     let mut next_line = || -> Result<String, Failure> {
@@ -56,22 +56,21 @@ fn read_header(input: &mut Input) -> Result<Grid, Failure> {
     Ok(Grid::new(translate, [scale / side; 3], dims)?)
 }
 
-pub(super) fn grid(mut input: Input) -> Result<LoadedGrid, Failure> {
+pub(super) fn grid(mut input: Input<'_>) -> Result<LoadedGrid, Failure> {
     Ok(LoadedGrid { grid: read_header(&mut input)?, warnings: Vec::new() })
 }
 
-pub(super) fn volume(mut input: Input, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
+pub(super) fn volume(mut input: Input<'_>, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
     let grid = read_header(&mut input)?;
     check_backing(input.bytes / 2, VOXELS_PER_PAIR, grid.voxel_count())?;
     let mut volume = Volume::with_memory_limit(grid, memory_limit)?;
-    let side = u64::from(grid.dims()[0]);
+    let side = grid.dims()[0] as usize;
     let mut runs = Runs { reader: input.reader, value: false, left: 0 };
     let row_words = words_for(grid.dims()[0]);
     let column_words = volume.column_words();
-    let side_index = grid.dims()[0] as usize;
     // One plane x: rows of bits along y for every z, up to a multiple of 64.
     let mut plane = vec![0; column_words * WORD * row_words];
-    for columns in volume.words_mut().chunks_mut(side_index * column_words) {
+    for columns in volume.words_mut().chunks_mut(side * column_words) {
         plane.fill(0);
         let mut any = false;
         let mut at = 0;
@@ -95,16 +94,16 @@ pub(super) fn volume(mut input: Input, memory_limit: Option<u64>) -> Result<Load
 struct Runs<R> {
     reader: R,
     value: bool,
-    left: u64,
+    left: usize,
 }
 
 impl<R: Read> Runs<R> {
     /// The next voxels of equal value, at least one and at most `most`.
-    fn take(&mut self, most: u64) -> Result<(bool, u64), Failure> {
+    fn take(&mut self, most: usize) -> Result<(bool, usize), Failure> {
         while self.left == 0 {
             let mut pair = [0; 2];
             self.reader.read_exact(&mut pair)?;
-            (self.value, self.left) = (pair[0] != 0, u64::from(pair[1]));
+            (self.value, self.left) = (pair[0] != 0, usize::from(pair[1]));
         }
         let length = self.left.min(most);
         self.left -= length;
@@ -120,12 +119,16 @@ impl<R: Read> Runs<R> {
 }
 
 /// Sets voxels `at..at + length` of a plane, y fastest.
-fn set_run(plane: &mut [u64], row_words: usize, side: u64, at: u64, length: u64) {
-    // Runs have at most 255 voxels, and indices fit since the plane does.
-    for voxel in at..at + length {
-        let (row, bit) = (voxel / side, voxel % side);
-        if let (Ok(row), Ok(bit)) = (usize::try_from(row), usize::try_from(bit)) {
-            plane[row * row_words + bit / WORD] |= 1 << (bit % WORD);
+fn set_run(plane: &mut [u64], row_words: usize, side: usize, at: usize, length: usize) {
+    let (mut row, mut bit, mut left) = (at / side, at % side, length);
+    while left > 0 {
+        // What of the run lies in one word.
+        let count = left.min(side - bit).min(WORD - bit % WORD);
+        plane[row * row_words + bit / WORD] |= u64::MAX >> (WORD - count) << (bit % WORD);
+        left -= count;
+        bit += count;
+        if bit == side {
+            (row, bit) = (row + 1, 0);
         }
     }
 }

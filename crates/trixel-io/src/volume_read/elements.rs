@@ -7,6 +7,7 @@ use trixel::Volume;
 
 use super::{BUFFER_BYTES, Failure};
 use crate::bits::{WORD, pack, transpose, words_for};
+use crate::read::shown;
 
 /// How an element is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,10 +120,8 @@ pub(super) fn flags_of_text(text: &[u8]) -> Result<Vec<u8>, Failure> {
         .filter(|token| !token.is_empty())
         .map(|token| {
             let number = str::from_utf8(token).ok().and_then(|token| token.parse::<f64>().ok());
-            let number = number.ok_or_else(|| {
-                let token = String::from_utf8_lossy(&token[..token.len().min(40)]);
-                Failure::damaged("data", format!("{token:?} is not a number"))
-            })?;
+            let number =
+                number.ok_or_else(|| Failure::damaged("data", format!("`{}` is not a number", shown(token))))?;
             Ok(u8::from(number != 0.0))
         })
         .collect()

@@ -12,14 +12,13 @@ mod nrrd;
 mod raw;
 mod vti;
 
-use std::fs::File;
-use std::io::{self, BufReader};
+use std::io::{self, BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use trixel::{Grid, GridError, Volume, VolumeError};
 
-use crate::VolumeFormat;
-use crate::read::Problem;
+use crate::read::{Problem, empty_file};
+use crate::{VolumeFormat, extension, open};
 
 /// A volume and what was odd about its file.
 #[derive(Debug)]
@@ -55,7 +54,7 @@ pub enum VolumeReadError {
     #[error(
         "{}: not a volume format that trixel reads; it reads {}",
         path.display(),
-        VolumeFormat::list(VolumeFormat::ALL.into_iter().filter(|format| format.is_readable()))
+        extension::list(VolumeFormat::ALL.into_iter().filter(|f| f.is_readable()).map(VolumeFormat::extension))
     )]
     UnknownFormat {
         /// The file.
@@ -137,20 +136,32 @@ impl Failure {
 /// Reads of a few bytes each are served from buffers of this size.
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// An opened file and its length.
-struct Input {
-    reader: BufReader<File>,
+/// What a volume is read from: a file, or bytes in memory.
+trait Source: Read + Seek {}
+
+impl<T: Read + Seek> Source for T {}
+
+/// A source, buffered.
+type Reader<'a> = BufReader<Box<dyn Source + 'a>>;
+
+/// An opened file, or bytes in memory, and its length.
+struct Input<'a> {
+    reader: Reader<'a>,
     bytes: u64,
 }
 
-impl Input {
+impl<'a> Input<'a> {
+    fn new(source: impl Source + 'a, bytes: u64) -> Self {
+        Self { reader: BufReader::with_capacity(BUFFER_BYTES, Box::new(source)), bytes }
+    }
+
+    fn of(bytes: &'a [u8]) -> Self {
+        Self::new(Cursor::new(bytes), bytes.len() as u64)
+    }
+
     fn open(path: &Path) -> io::Result<Self> {
-        let file = File::open(path)?;
-        let metadata = file.metadata()?;
-        if metadata.is_dir() {
-            return Err(io::Error::from(io::ErrorKind::IsADirectory));
-        }
-        Ok(Self { reader: BufReader::with_capacity(BUFFER_BYTES, file), bytes: metadata.len() })
+        let (file, bytes) = open::open(path)?;
+        Ok(Self::new(file, bytes))
     }
 }
 
@@ -161,19 +172,65 @@ impl Input {
 /// When the file cannot be read, is of no format that is read, is damaged, uses a part of its format that is not
 /// supported (which is then named), or needs more memory than there is.
 pub fn read_volume(path: &Path, memory_limit: Option<u64>) -> Result<LoadedVolume, VolumeReadError> {
-    let (format, input) = open(path)?;
+    let (format, input) = open_volume(path)?;
+    read(format, path, input, || sidecar_of(path), memory_limit)
+}
+
+/// Reads a volume from the bytes of a file, where there is no file system or none to be trusted; `sidecar` holds those of
+/// the `.json` file beside a `.raw` file, and is not looked at for other formats. Errors name the path
+/// `<bytes>.EXTENSION`. For `memory_limit` see [`read_volume`].
+///
+/// # Errors
+/// As [`read_volume`].
+///
+/// ```
+/// use trixel_io::{VolumeFormat, volume_read::read_volume_bytes};
+/// let bytes = b"#binvox 1\ndim 2 2 2\ntranslate 0 0 0\nscale 1\ndata\n\x00\x07\x01\x01";
+/// let volume = read_volume_bytes(VolumeFormat::Binvox, bytes, None, Some(1 << 20))?.volume;
+/// assert_eq!(volume.iter().collect::<Vec<_>>(), [[1, 1, 1]]);
+/// assert_eq!(volume.grid().voxel_size(), [0.5; 3]);
+/// # Ok::<(), trixel_io::volume_read::VolumeReadError>(())
+/// ```
+pub fn read_volume_bytes(
+    format: VolumeFormat,
+    bytes: &[u8],
+    sidecar: Option<&[u8]>,
+    memory_limit: Option<u64>,
+) -> Result<LoadedVolume, VolumeReadError> {
+    let path = PathBuf::from(format!("<bytes>.{}", format.extension()));
+    let sidecar = || raw::Sidecar {
+        name: "<bytes>.json".to_owned(),
+        input: sidecar.map(Input::of).ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "it was not given")),
+    };
+    read(format, &path, Input::of(bytes), sidecar, memory_limit)
+}
+
+fn read<'a>(
+    format: VolumeFormat,
+    path: &Path,
+    input: Input<'a>,
+    sidecar: impl FnOnce() -> raw::Sidecar<'a>,
+    memory_limit: Option<u64>,
+) -> Result<LoadedVolume, VolumeReadError> {
+    check_not_empty(path, &input)?;
     match format {
         VolumeFormat::Npz => npz::volume(input, memory_limit),
         VolumeFormat::Npy => npy::volume(input, memory_limit),
         VolumeFormat::Binvox => binvox::volume(input, memory_limit),
         VolumeFormat::Vti => vti::volume(input, memory_limit),
         VolumeFormat::Nrrd => nrrd::volume(input, memory_limit),
-        VolumeFormat::Raw => raw::volume(input, path, memory_limit),
+        VolumeFormat::Raw => raw::volume(input, sidecar(), memory_limit),
         VolumeFormat::Vox | VolumeFormat::Obj | VolumeFormat::Ply | VolumeFormat::Stl | VolumeFormat::Glb => {
             return Err(VolumeReadError::UnknownFormat { path: path.to_owned() });
         }
     }
     .map_err(|failure| failure.at(path))
+}
+
+/// The `.json` file beside a `.raw` file.
+fn sidecar_of(path: &Path) -> raw::Sidecar<'static> {
+    let path = path.with_extension("json");
+    raw::Sidecar { name: path.display().to_string(), input: Input::open(&path) }
 }
 
 /// Reads only where the voxels of the volume at `path` are, without decoding them.
@@ -181,14 +238,15 @@ pub fn read_volume(path: &Path, memory_limit: Option<u64>) -> Result<LoadedVolum
 /// # Errors
 /// As [`read_volume`], as far as the header tells.
 pub fn read_grid(path: &Path) -> Result<LoadedGrid, VolumeReadError> {
-    let (format, input) = open(path)?;
+    let (format, input) = open_volume(path)?;
+    check_not_empty(path, &input)?;
     match format {
         VolumeFormat::Npz => npz::grid(input),
         VolumeFormat::Npy => npy::grid(input),
         VolumeFormat::Binvox => binvox::grid(input),
         VolumeFormat::Vti => vti::grid(input),
         VolumeFormat::Nrrd => nrrd::grid(input),
-        VolumeFormat::Raw => raw::grid(&input, path),
+        VolumeFormat::Raw => raw::grid(&input, sidecar_of(path)),
         VolumeFormat::Vox | VolumeFormat::Obj | VolumeFormat::Ply | VolumeFormat::Stl | VolumeFormat::Glb => {
             return Err(VolumeReadError::UnknownFormat { path: path.to_owned() });
         }
@@ -196,12 +254,19 @@ pub fn read_grid(path: &Path) -> Result<LoadedGrid, VolumeReadError> {
     .map_err(|failure| failure.at(path))
 }
 
-fn open(path: &Path) -> Result<(VolumeFormat, Input), VolumeReadError> {
+fn open_volume(path: &Path) -> Result<(VolumeFormat, Input<'static>), VolumeReadError> {
     let Some(format) = VolumeFormat::from_path(path).filter(|format| format.is_readable()) else {
         return Err(VolumeReadError::UnknownFormat { path: path.to_owned() });
     };
     let input = Input::open(path).map_err(|source| VolumeReadError::Io { path: path.to_owned(), source })?;
     Ok((format, input))
+}
+
+fn check_not_empty(path: &Path, input: &Input<'_>) -> Result<(), VolumeReadError> {
+    if input.bytes == 0 {
+        return Err(VolumeReadError::Damaged { path: path.to_owned(), problem: empty_file() });
+    }
+    Ok(())
 }
 
 /// Dimensions as the grid takes them.

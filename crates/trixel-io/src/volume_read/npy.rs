@@ -103,16 +103,16 @@ fn value<'a>(dictionary: &'a str, key: &str) -> Option<&'a str> {
 
 const NO_PLACE: &str = ".npy holds no grid: its origin was taken as 0 and its voxel size as 1";
 
-pub(super) fn grid(mut input: Input) -> Result<LoadedGrid, Failure> {
+pub(super) fn grid(mut input: Input<'_>) -> Result<LoadedGrid, Failure> {
     let (dims, _) = NpyHeader::read(&mut input.reader)?.occupancy()?;
     Ok(LoadedGrid { grid: Grid::new([0.0; 3], [1.0; 3], dims)?, warnings: vec![NO_PLACE.to_owned()] })
 }
 
-pub(super) fn volume(mut input: Input, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
+pub(super) fn volume(mut input: Input<'_>, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
     let header = NpyHeader::read(&mut input.reader)?;
     let (dims, _) = header.occupancy()?;
     let grid = Grid::new([0.0; 3], [1.0; 3], dims)?;
-    check_backing(input.bytes - header.bytes, 1, grid.voxel_count())?;
+    check_backing(input.bytes.saturating_sub(header.bytes), 1, grid.voxel_count())?;
     let mut volume = Volume::with_memory_limit(grid, memory_limit)?;
     header.read_occupancy(input.reader, &mut volume)?;
     Ok(LoadedVolume { volume, warnings: vec![NO_PLACE.to_owned()] })

@@ -1,37 +1,35 @@
 //! NumPy archives with `occupancy` or `indices` and `dims`, and `origin` and `voxel_size`.
 
-use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::Read;
 
-use trixel::{Grid, Volume};
+use trixel::{Grid, Volume, VolumeError};
 use zip::ZipArchive;
 use zip::read::ZipFile;
 use zip::result::ZipError;
 
 use super::npy::NpyHeader;
-use super::{BUFFER_BYTES, DEFLATE_RATIO, Failure, Input, LoadedGrid, LoadedVolume, check_backing, to_dims};
+use super::{DEFLATE_RATIO, Failure, Input, LoadedGrid, LoadedVolume, Reader, check_backing, to_dims};
+use crate::bits::WORD;
 
-type Entry<'a> = ZipFile<'a, BufReader<File>>;
-/// Reads one number.
-type NumberReader = fn(&mut dyn Read) -> Result<f64, Failure>;
+type Entry<'a, 'b> = ZipFile<'a, Reader<'b>>;
 
 impl From<ZipError> for Failure {
     fn from(error: ZipError) -> Self {
         match error {
             ZipError::Io(error) => error.into(),
-            error => Self::damaged("archive", error.to_string()),
+            error => Self::damaged("archive", format!("{error}; the file was cut short or is not a NumPy archive")),
         }
     }
 }
 
 /// An opened archive.
-struct Archive {
-    zip: ZipArchive<BufReader<File>>,
+struct Archive<'a> {
+    zip: ZipArchive<Reader<'a>>,
     bytes: u64,
 }
 
-impl Archive {
-    fn open(input: Input) -> Result<Self, Failure> {
+impl<'a> Archive<'a> {
+    fn open(input: Input<'a>) -> Result<Self, Failure> {
         Ok(Self { bytes: input.bytes, zip: ZipArchive::new(input.reader)? })
     }
 
@@ -40,7 +38,7 @@ impl Archive {
     }
 
     /// The header of an array, and its data.
-    fn array(&mut self, name: &str) -> Result<(NpyHeader, Entry<'_>), Failure> {
+    fn array(&mut self, name: &str) -> Result<(NpyHeader, Entry<'_, 'a>), Failure> {
         if !self.has(name) {
             let what = format!(
                 "there is no array named {name}; a volume has occupancy (or indices and dims), origin and voxel_size"
@@ -53,7 +51,7 @@ impl Archive {
     }
 
     /// The most bytes that the data of an entry can have.
-    fn most_bytes(file_bytes: u64, entry: &Entry<'_>) -> (u64, u64) {
+    fn most_bytes(file_bytes: u64, entry: &Entry<'_, 'a>) -> (u64, u64) {
         let ratio = if entry.compression() == zip::CompressionMethod::Stored { 1 } else { DEFLATE_RATIO };
         // The entry's own word on its size is not to be trusted beyond the file's.
         (entry.compressed_size().min(file_bytes), ratio)
@@ -61,13 +59,16 @@ impl Archive {
 
     /// Three numbers, or one for all three.
     fn triple(&mut self, name: &str) -> Result<[f64; 3], Failure> {
-        let (header, mut entry) = self.array(name)?;
-        let number = number_reader(name, &header.dtype)?;
-        let mut next = || number(&mut entry);
-        match header.shape.as_slice() {
-            [3] => Ok([next()?, next()?, next()?]),
-            [] | [1] => next().map(|value| [value; 3]),
-            shape => Err(Failure::damaged(name, format!("shape {shape:?} should be [3]"))),
+        let (header, entry) = self.array(name)?;
+        let count = match header.shape.as_slice() {
+            [] | [1] => 1,
+            [3] => 3,
+            shape => return Err(Failure::damaged(name, format!("shape {shape:?} should be [3]"))),
+        };
+        match *Numbers::new(name, &header.dtype, entry)?.read(count)? {
+            [x, y, z] => Ok([x, y, z]),
+            [value] => Ok([value; 3]),
+            _ => Err(Failure::damaged(name, "it should hold three numbers")),
         }
     }
 
@@ -97,35 +98,76 @@ impl Archive {
     }
 }
 
-/// A function that reads one number of NumPy type `dtype`.
-fn number_reader(name: &str, dtype: &str) -> Result<NumberReader, Failure> {
-    fn bytes<const N: usize>(reader: &mut dyn Read) -> Result<[u8; N], Failure> {
-        let mut bytes = [0; N];
-        reader.read_exact(&mut bytes)?;
-        Ok(bytes)
-    }
-    #[expect(clippy::cast_precision_loss, reason = "indices and dimensions are small; larger ones are refused after")]
-    Ok(match dtype {
-        "<f8" => |reader| Ok(f64::from_le_bytes(bytes(reader)?)),
-        "<f4" => |reader| Ok(f64::from(f32::from_le_bytes(bytes(reader)?))),
-        "<i4" => |reader| Ok(f64::from(i32::from_le_bytes(bytes(reader)?))),
-        "<u4" => |reader| Ok(f64::from(u32::from_le_bytes(bytes(reader)?))),
-        "<i2" => |reader| Ok(f64::from(i16::from_le_bytes(bytes(reader)?))),
-        "<u2" => |reader| Ok(f64::from(u16::from_le_bytes(bytes(reader)?))),
-        "<i8" => |reader| Ok(i64::from_le_bytes(bytes(reader)?) as f64),
-        "<u8" => |reader| Ok(u64::from_le_bytes(bytes(reader)?) as f64),
-        other => {
-            let what = format!("values of type {other} are not read; store little-endian int32, int64 or float64");
-            return Err(Failure::damaged(name, what));
-        }
-    })
+/// Appends the numbers that bytes hold.
+type Decode = fn(&[u8], &mut Vec<f64>);
+
+/// The numbers of an array, in the order of the file.
+struct Numbers<R> {
+    reader: R,
+    /// Bytes of a number.
+    size: u64,
+    decode: Decode,
+    bytes: Vec<u8>,
+    values: Vec<f64>,
 }
 
-pub(super) fn grid(input: Input) -> Result<LoadedGrid, Failure> {
+impl<R: Read> Numbers<R> {
+    /// Numbers of NumPy type `dtype`.
+    fn new(name: &str, dtype: &str, reader: R) -> Result<Self, Failure> {
+        // Integers above 2^53 round, and are far outside any grid.
+        macro_rules! numbers {
+            ($type:ty) => {
+                (size_of::<$type>() as u64, |bytes, values| {
+                    values.extend(bytes.as_chunks().0.iter().map(|&bytes| <$type>::from_le_bytes(bytes) as f64));
+                })
+            };
+        }
+        let (size, decode): (u64, Decode) = match dtype {
+            "<f8" => numbers!(f64),
+            "<f4" => numbers!(f32),
+            "|i1" => numbers!(i8),
+            "|u1" => numbers!(u8),
+            "<i2" => numbers!(i16),
+            "<u2" => numbers!(u16),
+            "<i4" => numbers!(i32),
+            "<u4" => numbers!(u32),
+            "<i8" => numbers!(i64),
+            "<u8" => numbers!(u64),
+            other => {
+                let what = format!("values of type {other} are not read; store little-endian int32, int64 or float64");
+                return Err(Failure::damaged(name, what));
+            }
+        };
+        Ok(Self { reader, size, decode, bytes: Vec::new(), values: Vec::new() })
+    }
+
+    /// The next `count` numbers.
+    fn read(&mut self, count: u64) -> Result<&[f64], Failure> {
+        let length = count * self.size;
+        self.bytes.clear();
+        self.reader.by_ref().take(length).read_to_end(&mut self.bytes)?;
+        if self.bytes.len() as u64 != length {
+            return Err(std::io::Error::from(std::io::ErrorKind::UnexpectedEof).into());
+        }
+        self.values.clear();
+        (self.decode)(&self.bytes, &mut self.values);
+        Ok(&self.values)
+    }
+
+    /// Makes sure that nothing follows; this also lets the archive check the checksum.
+    fn finish(mut self, name: &str) -> Result<(), Failure> {
+        if self.reader.read(&mut [0])? == 0 {
+            return Ok(());
+        }
+        Err(Failure::damaged(name, "there is more data than the header says"))
+    }
+}
+
+pub(super) fn grid(input: Input<'_>) -> Result<LoadedGrid, Failure> {
     Ok(LoadedGrid { grid: Archive::open(input)?.grid()?, warnings: Vec::new() })
 }
 
-pub(super) fn volume(input: Input, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
+pub(super) fn volume(input: Input<'_>, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
     let mut archive = Archive::open(input)?;
     let grid = archive.grid()?;
     let file_bytes = archive.bytes;
@@ -138,47 +180,68 @@ pub(super) fn volume(input: Input, memory_limit: Option<u64>) -> Result<LoadedVo
         return Ok(LoadedVolume { volume, warnings: Vec::new() });
     }
     let mut volume = Volume::with_memory_limit(grid, memory_limit)?;
-    read_indices(&mut archive, &mut volume)?;
+    read_indices(&mut archive, &mut volume, memory_limit)?;
     Ok(LoadedVolume { volume, warnings: Vec::new() })
 }
 
 /// Sets the voxels that the rows of `indices` name.
-fn read_indices(archive: &mut Archive, volume: &mut Volume) -> Result<(), Failure> {
+fn read_indices(archive: &mut Archive<'_>, volume: &mut Volume, memory_limit: Option<u64>) -> Result<(), Failure> {
+    /// Rows that are decoded at a time.
+    const CHUNK: usize = 1 << 12;
     let at = "indices";
     let (header, entry) = archive.array(at)?;
-    // Numbers are read one by one.
-    let mut entry = BufReader::with_capacity(BUFFER_BYTES, entry);
     let &[rows, 3] = header.shape.as_slice() else {
         return Err(Failure::damaged(at, format!("shape {:?} should be [N, 3]", header.shape)));
     };
     if header.dtype.as_bytes().get(1) == Some(&b'f') {
         return Err(Failure::damaged(at, format!("values of type {} cannot be indices; store int32", header.dtype)));
     }
-    let number = number_reader(at, &header.dtype)?;
-    let dims = volume.grid().dims();
-    let mut next = |axis: usize, row: u64| -> Result<u32, Failure> {
-        let (value, n) = (number(&mut entry)?, dims[axis]);
-        if !(0.0..f64::from(n)).contains(&value) {
-            let what = format!("index {value} of row {row} is outside the grid, whose axis has {n} voxels");
-            return Err(Failure::damaged(at, what));
+    let mut numbers = Numbers::new(at, &header.dtype, entry)?;
+    let [nx, ny, nz] = volume.grid().dims();
+    let index = |value: f64, n: u32, row: u64| {
+        if (0.0..f64::from(n)).contains(&value) {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just above")]
+            return Ok(value as u32);
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just above")]
-        Ok(value as u32)
+        let what = format!("index {value} of row {row} is outside the grid, whose axis has {n} voxels");
+        Err(Failure::damaged(at, what))
     };
+    let column_words = volume.column_words();
+    let needed = Volume::required_bytes(volume.grid()).saturating_add(rows.saturating_mul(8));
+    let dims = volume.grid().dims();
+    let words = volume.words_mut();
+    let mut set = |x: u32, y: u32, z: u32| {
+        let column = x as usize * ny as usize + y as usize;
+        words[column * column_words + z as usize / WORD] |= 1 << (z as usize % WORD);
+    };
+    let chunks = || (0..rows).step_by(CHUNK).map(|first| (first, (rows - first).min(CHUNK as u64)));
     if header.fortran {
-        // Column after column, as `numpy.argwhere` leaves its result: grown as it is read, not by the stated length.
-        let xs = (0..rows).map(|row| next(0, row)).collect::<Result<Vec<_>, _>>()?;
-        let ys = (0..rows).map(|row| next(1, row)).collect::<Result<Vec<_>, _>>()?;
-        for ((row, x), y) in (0..rows).zip(xs).zip(ys) {
-            volume.set([x, y, next(2, row)?]);
+        // Column after column, as `numpy.argwhere` leaves its result: x and y are kept until z comes.
+        if let Some(available) = memory_limit.filter(|&limit| needed > limit) {
+            return Err(VolumeError::OutOfMemory { dims, needed, available: Some(available) }.into());
+        }
+        // Grown as they are read, not by the stated length.
+        let mut columns = [Vec::new(), Vec::new()];
+        for (column, n) in columns.iter_mut().zip([nx, ny]) {
+            for (first, count) in chunks() {
+                for (row, &value) in (first..).zip(numbers.read(count)?) {
+                    column.push(index(value, n, row)?);
+                }
+            }
+        }
+        let [xs, ys] = columns;
+        let mut columns = xs.into_iter().zip(ys);
+        for (first, count) in chunks() {
+            for ((row, &value), (x, y)) in (first..).zip(numbers.read(count)?).zip(&mut columns) {
+                set(x, y, index(value, nz, row)?);
+            }
         }
     } else {
-        for row in 0..rows {
-            volume.set([next(0, row)?, next(1, row)?, next(2, row)?]);
+        for (first, count) in chunks() {
+            for (row, &[x, y, z]) in (first..).zip(numbers.read(3 * count)?.as_chunks().0) {
+                set(index(x, nx, row)?, index(y, ny, row)?, index(z, nz, row)?);
+            }
         }
     }
-    if entry.read(&mut [0])? != 0 {
-        return Err(Failure::damaged(at, "there is more data than the header says"));
-    }
-    Ok(())
+    numbers.finish(at)
 }

@@ -138,19 +138,21 @@ fn read_header(reader: &mut impl BufRead) -> Result<Header, Failure> {
         reader.read_until(b'\n', &mut line)?;
         let first = bytes == 0;
         bytes += line.len() as u64;
+        if first && !line.starts_with(b"NRRD000") {
+            return Err(Failure::damaged("header", "the file does not start with NRRD000, so it is not an NRRD file"));
+        }
         if line.last() != Some(&b'\n') {
             return Err(Failure::damaged("header", "it has no end (an empty line); the file was cut short"));
         }
         let text = String::from_utf8_lossy(&line);
         let text = text.trim_end_matches(['\n', '\r']);
-        if first {
-            if !text.starts_with("NRRD000") {
-                return Err(Failure::damaged("header", "the first line is not NRRD000X, so this is not an NRRD file"));
-            }
-        } else if text.is_empty() {
+        if text.is_empty() {
             return fields.finish(bytes);
-        } else if text.starts_with('#') {
-        } else if let Some((key, value)) = text.split_once(":=") {
+        }
+        if first || text.starts_with('#') {
+            continue;
+        }
+        if let Some((key, value)) = text.split_once(":=") {
             if key == "trixel origin" {
                 fields.corner = Some(numbers(key, value)?);
             }
@@ -162,12 +164,12 @@ fn read_header(reader: &mut impl BufRead) -> Result<Header, Failure> {
     }
 }
 
-pub(super) fn grid(mut input: Input) -> Result<LoadedGrid, Failure> {
+pub(super) fn grid(mut input: Input<'_>) -> Result<LoadedGrid, Failure> {
     let header = read_header(&mut input.reader)?;
     Ok(LoadedGrid { grid: header.grid, warnings: header.warnings })
 }
 
-pub(super) fn volume(mut input: Input, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
+pub(super) fn volume(mut input: Input<'_>, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
     let Header { grid, encoding, bytes, warnings } = read_header(&mut input.reader)?;
     let ratio = if encoding == Encoding::Gzip { DEFLATE_RATIO } else { 1 };
     check_backing(input.bytes.saturating_sub(bytes), ratio, grid.voxel_count())?;

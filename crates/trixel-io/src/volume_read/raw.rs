@@ -1,6 +1,6 @@
 //! One byte a voxel, described by a `.json` file beside it.
 
-use std::path::Path;
+use std::io;
 
 use serde_json::Value;
 use trixel::{Grid, Volume};
@@ -11,17 +11,25 @@ use super::{Failure, Input, LoadedGrid, LoadedVolume, to_dims};
 /// A sidecar is a few lines.
 const MAX_SIDECAR: u64 = 1 << 16;
 
-fn read_sidecar(input: &Input, path: &Path) -> Result<Grid, Failure> {
-    let sidecar = path.with_extension("json");
-    let at = format!("sidecar {}", sidecar.display());
+/// The file that describes a `.raw` file, or why it cannot be opened.
+pub(super) struct Sidecar<'a> {
+    /// Its name, for messages.
+    pub(super) name: String,
+    pub(super) input: io::Result<Input<'a>>,
+}
+
+/// Reads the description of `raw_bytes` bytes.
+fn read_sidecar(sidecar: Sidecar<'_>, raw_bytes: u64) -> Result<Grid, Failure> {
+    let at = format!("sidecar {}", sidecar.name);
     let damaged = |what: String| Failure::damaged(at.clone(), what);
-    let opened = Input::open(&sidecar)
+    let input = sidecar
+        .input
         .map_err(|error| damaged(format!("{error}; a .raw file needs it, as it holds dims, origin and voxel_size")))?;
-    if opened.bytes > MAX_SIDECAR {
-        return Err(damaged(format!("{} bytes are too many for a description", opened.bytes)));
+    if input.bytes > MAX_SIDECAR {
+        return Err(damaged(format!("{} bytes are too many for a description", input.bytes)));
     }
     let value: Value =
-        serde_json::from_reader(opened.reader).map_err(|error| damaged(format!("{error}; it should be JSON")))?;
+        serde_json::from_reader(input.reader).map_err(|error| damaged(format!("{error}; it should be JSON")))?;
     let text = |key: &str, expected: &str| match value.get(key) {
         None => Ok(()),
         Some(found) if found == expected => Ok(()),
@@ -41,19 +49,23 @@ fn read_sidecar(input: &Input, path: &Path) -> Result<Grid, Failure> {
         .and_then(|[x, y, z]| Some([x.as_u64()?, y.as_u64()?, z.as_u64()?]))
         .ok_or_else(|| damaged("dims should be three whole numbers".to_owned()))?;
     let grid = Grid::new(floats("origin")?, floats("voxel_size")?, to_dims(dims)?)?;
-    if input.bytes != grid.voxel_count() {
-        let what = format!("it describes {} voxels, but the .raw file has {} bytes", grid.voxel_count(), input.bytes);
+    if raw_bytes != grid.voxel_count() {
+        let what = format!("it describes {} voxels, but the .raw file has {raw_bytes} bytes", grid.voxel_count());
         return Err(damaged(what));
     }
     Ok(grid)
 }
 
-pub(super) fn grid(input: &Input, path: &Path) -> Result<LoadedGrid, Failure> {
-    Ok(LoadedGrid { grid: read_sidecar(input, path)?, warnings: Vec::new() })
+pub(super) fn grid(input: &Input<'_>, sidecar: Sidecar<'_>) -> Result<LoadedGrid, Failure> {
+    Ok(LoadedGrid { grid: read_sidecar(sidecar, input.bytes)?, warnings: Vec::new() })
 }
 
-pub(super) fn volume(input: Input, path: &Path, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
-    let grid = read_sidecar(&input, path)?;
+pub(super) fn volume(
+    input: Input<'_>,
+    sidecar: Sidecar<'_>,
+    memory_limit: Option<u64>,
+) -> Result<LoadedVolume, Failure> {
+    let grid = read_sidecar(sidecar, input.bytes)?;
     let mut volume = Volume::with_memory_limit(grid, memory_limit)?;
     read_z_fastest(input.reader, Element::BYTE, &mut volume)?;
     Ok(LoadedVolume { volume, warnings: Vec::new() })

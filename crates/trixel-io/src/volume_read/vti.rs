@@ -2,21 +2,23 @@
 //!
 //! The format: VTK File Formats, "XML File Formats". The whole file is held in memory while it is read.
 
+use std::borrow::Cow;
 use std::io::{self, Cursor, Read};
 
 use flate2::bufread::ZlibDecoder;
-use roxmltree::{Document, Node};
+use memchr::memmem::find;
 use trixel::{Grid, Volume};
 
 use super::elements::{Element, flags_of_text, read_x_fastest};
 use super::{DEFLATE_RATIO, Failure, Input, LoadedGrid, LoadedVolume, check_backing, to_dims};
+use crate::xml::{Document, Element as Node};
 
 /// The array that holds occupancy, where there are several.
 const OCCUPANCY: &str = "occupancy";
 
 /// The file taken apart: its XML, and what follows the opening tag of `AppendedData`, which need not be XML.
 struct Parts<'a> {
-    xml: String,
+    xml: Cow<'a, str>,
     appended: &'a [u8],
 }
 
@@ -24,33 +26,26 @@ fn damaged(at: &str, what: impl Into<String>) -> Failure {
     Failure::damaged(at, what)
 }
 
-fn find(bytes: &[u8], pattern: &[u8]) -> Option<usize> {
-    bytes.windows(pattern.len()).position(|window| window == pattern)
-}
-
 fn take_apart(bytes: &[u8]) -> Result<Parts<'_>, Failure> {
-    let utf8 = |bytes: &[u8]| {
-        String::from_utf8(bytes.to_vec()).map_err(|_| damaged("header", "the XML is not UTF-8; the file is damaged"))
-    };
+    fn utf8(bytes: &[u8]) -> Result<&str, Failure> {
+        str::from_utf8(bytes).map_err(|_| damaged("header", "the XML is not UTF-8; the file is damaged"))
+    }
     let Some(tag) = find(bytes, b"<AppendedData") else {
-        return Ok(Parts { xml: utf8(bytes)?, appended: &[] });
+        return Ok(Parts { xml: utf8(bytes)?.into(), appended: &[] });
     };
     let end = find(&bytes[tag..], b">").ok_or_else(|| damaged("AppendedData", "the file was cut short"))? + tag;
     // Closed here, so that what comes before is a document of its own.
-    let mut xml = utf8(&bytes[..end])?;
-    xml.push_str("/></VTKFile>");
+    let xml = format!("{}/></VTKFile>", utf8(&bytes[..end])?);
     let rest = &bytes[end + 1..];
     let start = find(rest, b"_").ok_or_else(|| damaged("AppendedData", "there is no _ before the data"))?;
-    Ok(Parts { xml, appended: &rest[start + 1..] })
+    Ok(Parts { xml: xml.into(), appended: &rest[start + 1..] })
 }
 
-fn child<'a>(node: Node<'a, 'a>, name: &str) -> Result<Node<'a, 'a>, Failure> {
-    node.children()
-        .find(|child| child.has_tag_name(name))
-        .ok_or_else(|| damaged(node.tag_name().name(), format!("there is no element {name} in it")))
+fn child<'a>(node: Node<'a>, name: &str) -> Result<Node<'a>, Failure> {
+    node.child(name).ok_or_else(|| damaged(node.name(), format!("there is no element {name} in it")))
 }
 
-fn numbers<const N: usize>(node: Node<'_, '_>, name: &str) -> Result<Option<[f64; N]>, Failure> {
+fn numbers<const N: usize>(node: Node<'_>, name: &str) -> Result<Option<[f64; N]>, Failure> {
     let Some(text) = node.attribute(name) else { return Ok(None) };
     let values: Option<Vec<f64>> = text.split_whitespace().map(|number| number.parse().ok()).collect();
     match values.and_then(|values| <[f64; N]>::try_from(values).ok()) {
@@ -59,13 +54,14 @@ fn numbers<const N: usize>(node: Node<'_, '_>, name: &str) -> Result<Option<[f64
     }
 }
 
-fn read_grid<'a>(document: &'a Document<'a>) -> Result<(Grid, Node<'a, 'a>), Failure> {
-    let root = document.root_element();
-    if !root.has_tag_name("VTKFile") || root.attribute("type") != Some("ImageData") {
+/// The root, the grid and the piece.
+fn read_header<'a>(document: &'a Document<'a>) -> Result<(Node<'a>, Grid, Node<'a>), Failure> {
+    let root = document.root().filter(|root| root.name() == "VTKFile");
+    let Some(root) = root.filter(|root| root.attribute("type").as_deref() == Some("ImageData")) else {
         return Err(damaged("header", "this is not a VTK file of type ImageData"));
-    }
+    };
     let image = child(root, "ImageData")?;
-    let pieces = image.children().filter(|child| child.has_tag_name("Piece")).count();
+    let pieces = image.all("Piece").count();
     if pieces != 1 {
         return Err(damaged("ImageData", format!("{pieces} pieces; only files of one piece are read")));
     }
@@ -89,15 +85,15 @@ fn read_grid<'a>(document: &'a Document<'a>) -> Result<(Grid, Node<'a, 'a>), Fai
     let dims = to_dims(counts.map(|n| n as u64))?;
     // Extents may start anywhere; the origin is where point 0 would be.
     let corner = std::array::from_fn(|i| if low[i] == 0.0 { origin[i] } else { origin[i] + low[i] * spacing[i] });
-    Ok((Grid::new(corner, spacing, dims)?, piece))
+    Ok((root, Grid::new(corner, spacing, dims)?, piece))
 }
 
 /// The array of cell data that is the occupancy.
-fn find_array<'a>(piece: Node<'a, 'a>) -> Result<Node<'a, 'a>, Failure> {
+fn find_array(piece: Node<'_>) -> Result<Node<'_>, Failure> {
     let cells = child(piece, "CellData")?;
-    let arrays: Vec<_> = cells.children().filter(|child| child.has_tag_name("DataArray")).collect();
-    let named = |name: &str| arrays.iter().find(|array| array.attribute("Name") == Some(name));
-    let chosen = named(OCCUPANCY).or_else(|| named(cells.attribute("Scalars")?)).or(match arrays.as_slice() {
+    let arrays: Vec<_> = cells.all("DataArray").collect();
+    let named = |name: &str| arrays.iter().find(|array| array.attribute("Name").as_deref() == Some(name));
+    let chosen = named(OCCUPANCY).or_else(|| named(&cells.attribute("Scalars")?)).or(match arrays.as_slice() {
         [only] => Some(only),
         _ => None,
     });
@@ -105,7 +101,7 @@ fn find_array<'a>(piece: Node<'a, 'a>) -> Result<Node<'a, 'a>, Failure> {
         let what = format!("{} arrays, none of them named {OCCUPANCY}; voxels are cells, not points", arrays.len());
         damaged("CellData", what)
     })?;
-    match array.attribute("NumberOfComponents") {
+    match array.attribute("NumberOfComponents").as_deref() {
         None | Some("1") => Ok(array),
         Some(n) => Err(damaged("DataArray", format!("{n} components; occupancy has one"))),
     }
@@ -125,32 +121,28 @@ fn element(kind: &str, big_endian: bool) -> Result<Element, Failure> {
     })
 }
 
-pub(super) fn grid(mut input: Input) -> Result<LoadedGrid, Failure> {
+pub(super) fn grid(mut input: Input<'_>) -> Result<LoadedGrid, Failure> {
     let mut bytes = Vec::new();
     input.reader.read_to_end(&mut bytes)?;
     let parts = take_apart(&bytes)?;
-    let document = parse(&parts.xml)?;
-    Ok(LoadedGrid { grid: read_grid(&document)?.0, warnings: Vec::new() })
+    let document = Document::parse(&parts.xml)?;
+    let (_, grid, _) = read_header(&document)?;
+    Ok(LoadedGrid { grid, warnings: Vec::new() })
 }
 
-fn parse(xml: &str) -> Result<Document<'_>, Failure> {
-    Document::parse(xml).map_err(|error| damaged("header", format!("{error}; the file is damaged")))
-}
-
-pub(super) fn volume(mut input: Input, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
+pub(super) fn volume(mut input: Input<'_>, memory_limit: Option<u64>) -> Result<LoadedVolume, Failure> {
     let mut bytes = Vec::new();
     input.reader.read_to_end(&mut bytes)?;
     let parts = take_apart(&bytes)?;
-    let document = parse(&parts.xml)?;
-    let root = document.root_element();
-    let (grid, piece) = read_grid(&document)?;
+    let document = Document::parse(&parts.xml)?;
+    let (root, grid, piece) = read_header(&document)?;
     let array = find_array(piece)?;
-    let big_endian = root.attribute("byte_order") == Some("BigEndian");
-    let element = element(array.attribute("type").unwrap_or_default(), big_endian)?;
+    let big_endian = root.attribute("byte_order").as_deref() == Some("BigEndian");
+    let element = element(&array.attribute("type").unwrap_or_default(), big_endian)?;
     let needed = grid.voxel_count().saturating_mul(element.bytes as u64);
-    let integers = Integers { big_endian, wide: root.attribute("header_type") == Some("UInt64") };
-    let text = array.text().unwrap_or_default();
-    let (data, base64) = match array.attribute("format") {
+    let integers = Integers { big_endian, wide: root.attribute("header_type").as_deref() == Some("UInt64") };
+    let text = array.text();
+    let (data, base64) = match array.attribute("format").as_deref() {
         Some("ascii") => {
             check_backing(text.len() as u64, 1, grid.voxel_count())?;
             let mut volume = Volume::with_memory_limit(grid, memory_limit)?;
@@ -159,9 +151,13 @@ pub(super) fn volume(mut input: Input, memory_limit: Option<u64>) -> Result<Load
         }
         Some("binary") => (text.as_bytes(), true),
         Some("appended") => {
-            let encoding = child(root, "AppendedData")?.attribute("encoding").unwrap_or("base64");
+            let encoding = child(root, "AppendedData")?.attribute("encoding");
+            let encoding = encoding.as_deref().unwrap_or("base64");
             if !matches!(encoding, "raw" | "base64") {
-                return Err(damaged("AppendedData", format!("encoding {encoding} is not supported")));
+                return Err(damaged(
+                    "AppendedData",
+                    format!("encoding {encoding} is not supported; use raw or base64"),
+                ));
             }
             let offset = array.attribute("offset").and_then(|offset| offset.parse::<usize>().ok());
             let data = offset.and_then(|offset| parts.appended.get(offset..));
@@ -171,7 +167,7 @@ pub(super) fn volume(mut input: Input, memory_limit: Option<u64>) -> Result<Load
         other => return Err(damaged("DataArray", format!("format {other:?} is unknown"))),
     };
     let reader: Box<dyn Read + '_> = if base64 { Box::new(Base64::new(data)) } else { Box::new(data) };
-    match root.attribute("compressor") {
+    match root.attribute("compressor").as_deref() {
         None | Some("") => {
             check_backing(data.len() as u64, 1, needed)?;
             let mut reader = reader;

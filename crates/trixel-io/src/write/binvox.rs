@@ -11,6 +11,7 @@ use trixel::{Grid, Volume};
 
 use super::WriteOptions;
 use crate::bits::{WORD, transpose, words_for};
+use crate::numbers::spaced;
 
 /// The format has one voxel size.
 pub(super) fn check(grid: &Grid) -> Result<(), String> {
@@ -29,9 +30,9 @@ pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl 
     let grid = volume.grid();
     let [nx, ny, nz] = grid.dims();
     let side = nx.max(ny).max(nz);
-    let [ox, oy, oz] = grid.origin();
+    let translate = spaced(grid.origin());
     let scale = grid.voxel_size()[0] * f64::from(side);
-    write!(out, "#binvox 1\ndim {side} {side} {side}\ntranslate {ox:?} {oy:?} {oz:?}\nscale {scale:?}\ndata\n")?;
+    write!(out, "#binvox 1\ndim {side} {side} {side}\ntranslate {translate}\nscale {scale:?}\ndata\n")?;
     let mut runs = RunWriter { out, value: false, length: 0 };
     let batch = u32::try_from(rayon::current_num_threads() * 8).unwrap_or(8);
     for start in (0..nx).step_by(batch as usize) {
@@ -62,9 +63,7 @@ fn plane_runs(volume: &Volume, x: u32, side: u32) -> Vec<u64> {
             for (y, row) in (first..ny).zip(&mut square) {
                 *row = volume.column(x, y)[word];
             }
-            if square.iter().any(|&row| row != 0) {
-                transpose(&mut square);
-            }
+            transpose(&mut square);
             for (z, row) in square.into_iter().enumerate() {
                 rows[z * row_words + group] = row;
             }

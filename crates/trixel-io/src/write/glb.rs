@@ -10,8 +10,9 @@ use std::io::{BufWriter, Write};
 use serde_json::{Value, json};
 use trixel::{Grid, UpAxis, Volume};
 
-use super::surface::{IndexedSurface, to_f32};
+use super::surface::IndexedSurface;
 use super::{Failure, WriteOptions};
+use crate::numbers::narrow;
 
 const UNSIGNED_INT: u32 = 5125;
 const FLOAT: u32 = 5126;
@@ -40,7 +41,7 @@ pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl 
     let grid = volume.grid();
     let size = grid.voxel_size();
     let coordinates: [Vec<f32>; 3] =
-        std::array::from_fn(|axis| (0..=grid.dims()[axis]).map(|i| to_f32(f64::from(i) * size[axis])).collect());
+        std::array::from_fn(|axis| (0..=grid.dims()[axis]).map(|i| narrow(f64::from(i) * size[axis])).collect());
     let position = |vertex: &[u32; 3]| -> [f32; 3] { std::array::from_fn(|i| coordinates[i][vertex[i] as usize]) };
     let position_bytes = surface.vertices.len() as u64 * 12;
     let index_bytes = surface.quads.len() as u64 * 24;

@@ -20,6 +20,7 @@ mod binvox;
 mod deflate;
 mod dense;
 mod glb;
+mod little_endian;
 mod npy_header;
 mod npz;
 mod nrrd;
@@ -42,6 +43,7 @@ pub use crate::volume_format::VolumeFormat;
 pub use npz::NpzWriter;
 
 use crate::atomic_file::AtomicFile;
+use crate::extension;
 
 /// How to write.
 #[derive(Clone, Copy)]
@@ -78,7 +80,7 @@ pub enum WriteError {
     #[error(
         "{}: unknown volume format; trixel writes {}",
         path.display(),
-        VolumeFormat::list(VolumeFormat::ALL)
+        extension::list(VolumeFormat::ALL.map(VolumeFormat::extension))
     )]
     UnknownFormat {
         /// The file.
@@ -158,6 +160,22 @@ pub fn check_target(path: &Path, grid: &Grid) -> Result<(), WriteError> {
 ///
 /// # Errors
 /// When the format is unknown or cannot hold the volume, or the system refuses. Nothing is left behind then.
+///
+/// ```
+/// use trixel::{Grid, Volume};
+/// use trixel_io::write::{WriteOptions, write_volume};
+///
+/// let mut volume = Volume::new(Grid::new([0.0; 3], [0.5; 3], [4, 4, 8])?)?;
+/// volume.set([1, 2, 3]);
+/// # let folder = tempfile::tempdir()?;
+/// # let folder = folder.path();
+/// let (surface, data) = (folder.join("voxel.glb"), folder.join("voxel.nrrd"));
+/// // Both files appear, or neither.
+/// let staged = write_volume(&surface, &volume, &WriteOptions::default())?;
+/// staged.join(write_volume(&data, &volume, &WriteOptions::default())?).commit()?;
+/// assert!(surface.is_file() && data.is_file());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_volume(path: &Path, volume: &Volume, options: &WriteOptions<'_>) -> Result<Staged, WriteError> {
     let Some(format) = VolumeFormat::from_path(path) else {
         return Err(WriteError::UnknownFormat { path: path.to_owned() });

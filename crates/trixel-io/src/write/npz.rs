@@ -11,6 +11,7 @@ use trixel::{Volume, set_bits};
 use super::WriteOptions;
 use super::deflate::{Fill, Stream};
 use super::dense::DenseBlocks;
+use super::little_endian::{put16, put32, put64};
 use super::npy_header::npy_header;
 
 /// The time stamp of every entry, the earliest there is (1980-01-01), so that equal volumes give equal files.
@@ -214,18 +215,6 @@ impl Entry {
 /// The 32-bit field of a value; the largest stands for "see the 64-bit field".
 fn saturate(value: u64) -> u32 {
     u32::try_from(value).unwrap_or(u32::MAX)
-}
-
-fn put16(out: &mut Vec<u8>, value: u16) {
-    out.extend(value.to_le_bytes());
-}
-
-fn put32(out: &mut Vec<u8>, value: u32) {
-    out.extend(value.to_le_bytes());
-}
-
-fn put64(out: &mut Vec<u8>, value: u64) {
-    out.extend(value.to_le_bytes());
 }
 
 /// Writes `occupancy` (bool, `[x, y, z]`), `origin` and `voxel_size` (f64[3]); or, sparse, `indices` (i32, N x 3, sorted

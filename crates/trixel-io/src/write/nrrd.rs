@@ -11,6 +11,7 @@ use trixel::Volume;
 use super::WriteOptions;
 use super::deflate::{BLOCK_BYTES, Stream};
 use super::x_fastest;
+use crate::numbers::spaced;
 
 /// A gzip header without name or time.
 const GZIP_HEADER: [u8; 10] = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255];
@@ -21,7 +22,6 @@ pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl 
     let [nx, ny, nz] = grid.dims();
     let [hx, hy, hz] = grid.voxel_size();
     let center = grid.center([0; 3]);
-    let origin = grid.origin();
     write!(
         out,
         "NRRD0005\n\
@@ -35,9 +35,12 @@ pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl 
          kinds: space space space\n\
          encoding: gzip\n\
          space origin: ({:?},{:?},{:?})\n\
-         trixel origin:={:?} {:?} {:?}\n\
+         trixel origin:={}\n\
          \n",
-        center[0], center[1], center[2], origin[0], origin[1], origin[2],
+        center[0],
+        center[1],
+        center[2],
+        spaced(grid.origin()),
     )?;
     out.write_all(&GZIP_HEADER)?;
     let mut stream = Stream::new();

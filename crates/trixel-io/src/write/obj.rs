@@ -8,16 +8,17 @@ use trixel::Volume;
 
 use super::surface::{IndexedSurface, coordinates};
 use super::{Failure, WriteOptions};
+use crate::numbers::spaced;
 
 /// Writes the surface of `volume`; comments hold the grid.
 pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl Write) -> Result<(), Failure> {
     let surface = IndexedSurface::new(volume, options)?;
     let grid = volume.grid();
-    let ([nx, ny, nz], [ox, oy, oz], [hx, hy, hz]) = (grid.dims(), grid.origin(), grid.voxel_size());
+    let ([nx, ny, nz], origin, size) = (grid.dims(), spaced(grid.origin()), spaced(grid.voxel_size()));
     // Small writes are cheaper into a buffer whose type is known here.
     let mut out = BufWriter::new(out);
-    writeln!(out, "# exposed faces of voxels\n# dims {nx} {ny} {nz}\n# origin {ox:?} {oy:?} {oz:?}")?;
-    writeln!(out, "# voxel_size {hx:?} {hy:?} {hz:?}")?;
+    writeln!(out, "# exposed faces of voxels\n# dims {nx} {ny} {nz}\n# origin {origin}")?;
+    writeln!(out, "# voxel_size {size}")?;
     // A coordinate is one of a few: print each once.
     let texts = coordinates(grid).map(|axis| axis.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>());
     for [x, y, z] in &surface.vertices {

@@ -6,12 +6,13 @@ use trixel::Volume;
 
 use super::surface::{IndexedSurface, coordinates};
 use super::{Failure, WriteOptions};
+use crate::numbers::spaced;
 
 /// Writes the surface of `volume`; comments hold the grid.
 pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl Write) -> Result<(), Failure> {
     let surface = IndexedSurface::new(volume, options)?;
     let grid = volume.grid();
-    let ([nx, ny, nz], [ox, oy, oz], [hx, hy, hz]) = (grid.dims(), grid.origin(), grid.voxel_size());
+    let ([nx, ny, nz], origin, size) = (grid.dims(), spaced(grid.origin()), spaced(grid.voxel_size()));
     let mut out = BufWriter::new(out);
     write!(
         out,
@@ -19,8 +20,8 @@ pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl 
          format binary_little_endian 1.0\n\
          comment exposed faces of voxels\n\
          comment dims {nx} {ny} {nz}\n\
-         comment origin {ox:?} {oy:?} {oz:?}\n\
-         comment voxel_size {hx:?} {hy:?} {hz:?}\n\
+         comment origin {origin}\n\
+         comment voxel_size {size}\n\
          element vertex {}\n\
          property double x\n\
          property double y\n\

@@ -6,14 +6,15 @@ use std::io::{BufWriter, Write};
 
 use trixel::{Grid, Volume};
 
-use super::surface::{coordinates, rectangles, to_f32};
+use super::surface::{coordinates, rectangles};
 use super::{Failure, WriteOptions};
+use crate::numbers::narrow;
 
 /// The format has single precision.
 pub(super) fn check(grid: &Grid) -> Result<(), String> {
     let distinct = |axis: Vec<f64>| {
-        let narrow: Vec<f32> = axis.into_iter().map(to_f32).collect();
-        narrow.iter().all(|value| value.is_finite()) && narrow.is_sorted_by(|a, b| a < b)
+        let axis: Vec<f32> = axis.into_iter().map(narrow).collect();
+        axis.iter().all(|value| value.is_finite()) && axis.is_sorted_by(|a, b| a < b)
     };
     if coordinates(grid).into_iter().all(distinct) {
         return Ok(());
@@ -32,7 +33,7 @@ pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl 
             "the surface has {triangles} triangles, and .stl counts them with 32 bits; choose a lower resolution"
         )));
     };
-    let coordinates = coordinates(volume.grid()).map(|axis| axis.into_iter().map(to_f32).collect::<Vec<_>>());
+    let coordinates = coordinates(volume.grid()).map(|axis| axis.into_iter().map(narrow).collect::<Vec<_>>());
     let mut out = BufWriter::new(out);
     // Must not begin with "solid", which marks the ASCII variant.
     let mut header = [0; 80];

@@ -130,9 +130,7 @@ fn z_faces(volume: &Volume, word: usize, positive: bool, found: &mut Vec<Rectang
                 };
                 *row = set & !beside;
             }
-            if square.iter().any(|&row| row != 0) {
-                transpose(&mut square);
-            }
+            transpose(&mut square);
             for (z, row) in square.into_iter().enumerate().take(layers) {
                 rows[z * row_words + group] = row;
             }
@@ -141,8 +139,10 @@ fn z_faces(volume: &Volume, word: usize, positive: bool, found: &mut Vec<Rectang
     let slices: Vec<Vec<Rectangle>> = (0..layers)
         .into_par_iter()
         .map(|z| {
-            let row = |rows: &[u64]| rows[z * row_words..(z + 1) * row_words].to_vec();
-            let mut mask: Vec<u64> = slab.chunks(row_length).flat_map(row).collect();
+            let mut mask = Vec::with_capacity(nx as usize * row_words);
+            for rows in slab.chunks(row_length) {
+                mask.extend(&rows[z * row_words..(z + 1) * row_words]);
+            }
             // At most `Grid::MAX_DIM`.
             let plane = u32::try_from(first + z).unwrap_or(u32::MAX) + u32::from(positive);
             let mut found = Vec::new();
@@ -216,12 +216,6 @@ fn take_run(row: &mut [u64], first: usize, end: usize) -> bool {
 pub(super) fn coordinates(grid: &Grid) -> [Vec<f64>; 3] {
     let (origin, size) = (grid.origin(), grid.voxel_size());
     std::array::from_fn(|axis| (0..=grid.dims()[axis]).map(|i| origin[axis] + f64::from(i) * size[axis]).collect())
-}
-
-/// Rounds to single precision.
-#[expect(clippy::cast_possible_truncation, reason = "the rounding is the purpose; formats check the range")]
-pub(super) fn to_f32(value: f64) -> f32 {
-    value as f32
 }
 
 /// Rectangles with shared corners.

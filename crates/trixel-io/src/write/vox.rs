@@ -14,7 +14,9 @@ use std::ops::Range;
 
 use trixel::{Grid, UpAxis, Volume, WORD_BITS};
 
+use super::little_endian::put32;
 use super::{Failure, WriteOptions};
+use crate::numbers::spaced;
 
 /// Voxels of a model along an axis.
 const MODEL_SIDE: u32 = 256;
@@ -163,23 +165,32 @@ impl Scene<'_> {
         out.write_all(&u32::try_from(part.voxels).unwrap_or(u32::MAX).to_le_bytes())?;
         let dims = self.volume.grid().dims();
         let mut result = Ok(());
-        let mut records = Vec::new();
+        let mut records = [0; WORD_BITS as usize * 4];
         self.for_each_word(part, |[x, y], start, bits| {
-            records.clear();
-            let mut rest = bits;
-            while rest != 0 {
-                let voxel = [x, y, start + rest.trailing_zeros()];
-                rest &= rest - 1;
-                for (axis, range) in self.axes.iter().zip(&part.range) {
-                    let n = dims[axis.from];
-                    let at = if axis.reversed { n - 1 - voxel[axis.from] } else { voxel[axis.from] };
-                    // Below the model's side of 256.
-                    records.push(u8::try_from(at - range.start).unwrap_or(u8::MAX));
+            // A record is x, y and z in the model, each below its side of 256, and the colour: as one little-endian
+            // number, whose change from one voxel of the column to the next is the same for all.
+            let (mut first, mut step) = (u32::from(COLOR) << 24, 0u32);
+            for (place, (axis, range)) in self.axes.iter().zip(&part.range).enumerate() {
+                let (n, at) = (dims[axis.from], [x, y, start][axis.from]);
+                // The word may start before the part; what is too little or too much cancels out.
+                let at = if axis.reversed { n.wrapping_sub(1 + at) } else { at }.wrapping_sub(range.start);
+                first = first.wrapping_add(at << (8 * place));
+                if axis.from == 2 {
+                    step = if axis.reversed { 1u32.wrapping_neg() } else { 1 } << (8 * place);
                 }
-                records.push(COLOR);
+            }
+            let mut rest = bits;
+            let mut length = 0;
+            for record in records.as_chunks_mut().0 {
+                if rest == 0 {
+                    break;
+                }
+                *record = first.wrapping_add(step.wrapping_mul(rest.trailing_zeros())).to_le_bytes();
+                rest &= rest - 1;
+                length += record.len();
             }
             if result.is_ok() {
-                result = out.write_all(&records);
+                result = out.write_all(&records[..length]);
             }
         });
         result
@@ -194,12 +205,11 @@ impl Scene<'_> {
     /// The chunks of the scene graph: a root transform, a group, and a transform and a shape for each model.
     fn graph(&self, parts: &[Part]) -> Vec<u8> {
         let grid = self.volume.grid();
-        let numbers = |values: [f64; 3]| values.map(|value| format!("{value:?}")).join(" ");
         let [nx, ny, nz] = grid.dims();
         // The editor ignores attributes it does not know.
         let attributes = [
-            ("trixel_origin", numbers(grid.origin())),
-            ("trixel_voxel_size", numbers(grid.voxel_size())),
+            ("trixel_origin", spaced(grid.origin())),
+            ("trixel_voxel_size", spaced(grid.voxel_size())),
             ("trixel_dims", format!("{nx} {ny} {nz}")),
         ];
         // At most 8^3 parts.
@@ -265,10 +275,6 @@ fn chunk_header(id: &[u8; 4], content: u64, children: u64) -> [u8; 12] {
     header[4..8].copy_from_slice(&content);
     header[8..].copy_from_slice(&children);
     header
-}
-
-fn put32(out: &mut Vec<u8>, value: u32) {
-    out.extend(value.to_le_bytes());
 }
 
 fn put_dictionary(out: &mut Vec<u8>, entries: &[(&str, String)]) {

@@ -10,12 +10,12 @@ use trixel::Volume;
 use super::WriteOptions;
 use super::deflate::{BLOCK_BYTES, Deflater, Framing};
 use super::x_fastest;
+use crate::numbers::spaced;
 
 /// Writes the volume as the `UInt8` cell array `occupancy`.
 pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut (impl Write + Seek)) -> io::Result<()> {
     let grid = volume.grid();
     let [nx, ny, nz] = grid.dims();
-    let numbers = |values: [f64; 3]| values.map(|value| format!("{value:?}")).join(" ");
     let extent = format!("0 {nx} 0 {ny} 0 {nz}");
     write!(
         out,
@@ -30,8 +30,8 @@ pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut (impl
   </ImageData>
   <AppendedData encoding="raw">
     _"#,
-        numbers(grid.origin()),
-        numbers(grid.voxel_size()),
+        spaced(grid.origin()),
+        spaced(grid.voxel_size()),
     )?;
     let block_rows = x_fastest::rows_per_block(volume, BLOCK_BYTES) as u64;
     let rows = u64::from(ny) * u64::from(nz);

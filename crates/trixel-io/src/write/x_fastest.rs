@@ -76,10 +76,7 @@ fn transpose_slab(volume: &Volume, word: usize, depth: usize, slab: &mut [u64]) 
             for (x, row) in (first..nx as usize).zip(&mut square) {
                 *row = words[(x * ny as usize + y) * column_words + word];
             }
-            // Most of a typical grid is empty.
-            if square.iter().any(|&row| row != 0) {
-                transpose(&mut square);
-            }
+            transpose(&mut square);
             for (z, row) in square.into_iter().enumerate().take(depth) {
                 rows[z * row_words + group] = row;
             }

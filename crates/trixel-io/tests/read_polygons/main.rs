@@ -8,6 +8,8 @@ mod models;
 mod obj;
 mod off;
 mod ply;
+#[path = "../common/models.rs"]
+mod real;
 mod stl;
 
 use trixel_io::read::{Loaded, MeshFormat, ReadError, ReadOptions, read_mesh_bytes};

@@ -1,7 +1,5 @@
 //! The real meshes, where they are, against the table beside them.
 
-use std::path::{Path, PathBuf};
-
 use trixel_io::read::{MeshFormat, ReadOptions, read_mesh};
 
 /// One row of the table.
@@ -12,11 +10,6 @@ struct Row {
     vertices: usize,
     min: Vec<f64>,
     max: Vec<f64>,
-}
-
-fn folder() -> PathBuf {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/models");
-    std::env::var_os("TRIXEL_MODELS").map_or_else(beside, PathBuf::from)
 }
 
 fn parse(row: &str) -> Option<Row> {
@@ -41,9 +34,9 @@ fn close(printed: f64, found: f64) -> bool {
 
 #[test]
 fn real_polygon_meshes_match_their_table() {
-    let folder = folder();
+    let Some(folder) = super::real::models_folder() else { return };
     let Ok(table) = std::fs::read_to_string(folder.join("README.md")) else {
-        println!("skipped: no README.md in {}; set TRIXEL_MODELS to the folder of test meshes", folder.display());
+        println!("skipped: no README.md in {}", folder.display());
         return;
     };
     let mut read = 0;

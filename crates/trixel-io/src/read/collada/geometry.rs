@@ -4,12 +4,14 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use trixel::{Attribute, Mesh};
+use trixel::Mesh;
 
-use super::dom::Element;
-use super::triangulate_polygon;
+use crate::numbers::narrow;
 use crate::read::Problem;
-use crate::read::assemble::{Budget, Part, linear_from_srgb, narrow};
+use crate::read::assemble::{Budget, CornerAttribute, Part};
+use crate::read::color::linear;
+use crate::read::polygon::triangulate_corners;
+use crate::xml::Element;
 
 /// Sets of texture coordinates that are read.
 const MOST_UV_SETS: usize = 4;
@@ -134,7 +136,7 @@ impl Geometries {
                         for corner in first..first + count {
                             polygon.push(builder.vertex(&list, corner)?);
                         }
-                        triangulate_polygon(&builder.part.positions, &polygon, &mut triangles);
+                        triangulate_corners(&builder.part.positions, &polygon, &mut triangles);
                         for triangle in &triangles {
                             builder.triangle(&list, triangle.map(|corner| first + corner as usize))?;
                         }
@@ -203,12 +205,11 @@ impl Geometries {
                 }
                 "COLOR" if corners.color.is_none() => {
                     // Authoring tools write what the screen shows, which is sRGB.
-                    let linear = |c: [f64; 4], components| {
+                    let color = |c: [f64; 4], components| {
                         let [r, g, b, a] = c.map(narrow);
-                        let alpha = if components < 4 { 1.0 } else { a };
-                        [linear_from_srgb(r), linear_from_srgb(g), linear_from_srgb(b), alpha]
+                        linear([r, g, b, if components < 4 { 1.0 } else { a }])
                     };
-                    let span = self.layer(&mut builder.colors, target(input)?, linear)?;
+                    let span = self.layer(&mut builder.colors, target(input)?, color)?;
                     corners.color = Some((offset, span));
                 }
                 "TEXCOORD" if corners.uvs.len() < MOST_UV_SETS => {
@@ -236,8 +237,9 @@ impl Geometries {
             return Ok(span);
         }
         let (values, components) = self.vectors::<N>(source)?;
-        let span = Span::new(layer.values.len(), values.len());
-        layer.values.extend(values.into_iter().map(|value| convert(value, components)));
+        let gathered = &mut layer.attribute.values;
+        let span = Span::new(gathered.len(), values.len());
+        gathered.extend(values.into_iter().map(|value| convert(value, components)));
         layer.sources.insert(source.index(), span);
         Ok(span)
     }
@@ -355,31 +357,13 @@ impl List<'_> {
 
 /// Values on corners, gathered from sources.
 struct Layer<T> {
-    values: Vec<T>,
-    corners: Vec<[u32; 3]>,
+    attribute: CornerAttribute<T>,
     sources: HashMap<usize, Span>,
 }
 
 impl<T> Default for Layer<T> {
     fn default() -> Self {
-        Self { values: Vec::new(), corners: Vec::new(), sources: HashMap::new() }
-    }
-}
-
-impl<T: Copy> Layer<T> {
-    fn push(&mut self, triangle: usize, corners: [u32; 3]) {
-        if corners != [Attribute::<T>::NONE; 3] {
-            self.corners.resize(triangle, [Attribute::<T>::NONE; 3]);
-            self.corners.push(corners);
-        }
-    }
-
-    fn finish(mut self, triangles: usize) -> Option<Attribute<T>> {
-        if self.corners.is_empty() {
-            return None;
-        }
-        self.corners.resize(triangles, [Attribute::<T>::NONE; 3]);
-        Some(Attribute { values: self.values, corners: Some(self.corners) })
+        Self { attribute: CornerAttribute::default(), sources: HashMap::new() }
     }
 }
 
@@ -438,10 +422,10 @@ impl Builder {
         let triangle = self.part.triangles.len();
         self.part.triangles.push(vertices);
         let values = |input: Option<&(usize, Span)>| corners.map(|corner| list.value(input, corner));
-        self.normals.push(triangle, values(list.corners.normal.as_ref()));
-        self.colors.push(triangle, values(list.corners.color.as_ref()));
+        self.normals.attribute.push(triangle, values(list.corners.normal.as_ref()));
+        self.colors.attribute.push(triangle, values(list.corners.color.as_ref()));
         for (layer, input) in self.uvs.iter_mut().zip(&list.corners.uvs) {
-            layer.push(triangle, values(Some(input)));
+            layer.attribute.push(triangle, values(Some(input)));
         }
         if let Some(symbol) = self.symbol {
             self.part.materials.resize(triangle, Mesh::NO_MATERIAL);
@@ -463,9 +447,9 @@ impl Builder {
         if !part.materials.is_empty() {
             part.materials.resize(triangles, Mesh::NO_MATERIAL);
         }
-        part.normals = self.normals.finish(triangles);
-        part.colors = self.colors.finish(triangles);
-        part.uvs = self.uvs.into_iter().map(|layer| layer.finish(triangles)).collect();
+        part.normals = self.normals.attribute.finish(triangles);
+        part.colors = self.colors.attribute.finish(triangles);
+        part.uvs = self.uvs.into_iter().map(|layer| layer.attribute.finish(triangles)).collect();
         Geometry { part, symbols: self.symbols }
     }
 }

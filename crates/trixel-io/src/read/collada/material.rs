@@ -4,9 +4,10 @@ use std::collections::HashMap;
 
 use trixel::{AlphaMode, Filter, Image, ImageSource, Material, Texture, TextureRef, Wrap};
 
-use super::dom::{Document, Element};
+use crate::numbers::narrow;
 use crate::read::Resources;
-use crate::read::assemble::{linear_from_srgb, narrow};
+use crate::read::color::linear;
+use crate::xml::{Document, Element};
 
 /// The materials that triangles have used so far.
 pub(super) struct Materials<'d> {
@@ -73,7 +74,7 @@ impl<'d> Materials<'d> {
         let Some(shader) = shader else { return out };
 
         let diffuse = self.paint(effect, profile, shader.child("diffuse"));
-        // A texture replaces the colour.
+        // A texture replaces the colour. Authoring tools write what the screen shows, which is sRGB.
         out.base_color_texture = diffuse.texture.map(TextureRef::new);
         if let (Some(color), None) = (diffuse.color, diffuse.texture) {
             out.base_color = linear(color);
@@ -211,9 +212,4 @@ fn color(element: Element<'_>) -> Option<[f32; 4]> {
 
 fn float(element: Option<Element<'_>>) -> Option<f32> {
     element?.child("float")?.numbers().ok()?.first().copied().map(narrow)
-}
-
-/// Authoring tools write what the screen shows, which is sRGB.
-fn linear([r, g, b, a]: [f32; 4]) -> [f32; 4] {
-    [linear_from_srgb(r), linear_from_srgb(g), linear_from_srgb(b), a]
 }

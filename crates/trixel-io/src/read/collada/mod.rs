@@ -3,7 +3,6 @@
 //! Units and the up axis are kept as the file has them, only named in [`Mesh::up`](trixel::Mesh::up). Skinned meshes are
 //! read in their bind shape, morphed ones in their base shape; references to other documents are not followed.
 
-mod dom;
 mod geometry;
 mod material;
 mod node;
@@ -16,13 +15,14 @@ use std::rc::Rc;
 
 use trixel::{Mesh, UpAxis};
 
-use self::dom::{Document, Element};
 use self::geometry::{Geometries, Geometry};
 use self::material::Materials;
 use super::assemble::{Assembly, Budget};
 use super::instances::{Child, walk};
+use super::text::without_byte_order_mark;
 use super::transform::Affine;
 use super::{Loaded, Problem, ReadOptions, Resources};
+use crate::xml::{Document, Element};
 
 /// Reads COLLADA.
 pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resources) -> Result<Loaded, Problem> {
@@ -67,7 +67,7 @@ fn decode(bytes: &[u8]) -> Cow<'_, str> {
     match bytes {
         [0xff, 0xfe, ..] => Cow::Owned(words(false)),
         [0xfe, 0xff, ..] => Cow::Owned(words(true)),
-        _ => String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)),
+        _ => String::from_utf8_lossy(without_byte_order_mark(bytes)),
     }
 }
 
@@ -228,10 +228,4 @@ impl<'d> SceneReader<'d> {
         };
         symbols.iter().map(material).collect()
     }
-}
-
-/// Appends the triangles of a polygon of vertices, which name its corners by number: the fan around the first.
-fn triangulate_polygon(_positions: &[[f64; 3]], polygon: &[u32], out: &mut Vec<[u32; 3]>) {
-    let corners = u32::try_from(polygon.len()).unwrap_or(u32::MAX);
-    out.extend((2..corners).map(|corner| [0, corner - 1, corner]));
 }

@@ -1,8 +1,8 @@
 //! The transforms of COLLADA nodes (COLLADA 1.4.1, chapter 5).
 
-use super::dom::Element;
 use crate::read::Problem;
 use crate::read::transform::Affine;
+use crate::xml::Element;
 
 /// All transforms of a node together: the first in the file is applied last.
 pub(super) fn transform(node: Element<'_>) -> Result<Affine, Problem> {
@@ -120,8 +120,8 @@ fn unit(v: [f64; 3]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::dom::Document;
     use super::*;
+    use crate::xml::Document;
 
     fn moved(transforms: &str, point: [f64; 3]) -> [f64; 3] {
         let text = format!("<node>{transforms}</node>");

@@ -71,6 +71,22 @@ fn every_primitive_with_an_area() {
 }
 
 #[test]
+fn concave_polygons_keep_their_shape() {
+    // A square with a notch from above, which the fan around the first corner would cover.
+    let pos = "0 0 0 4 0 0 4 4 0 2 1 0 0 4 0";
+    let primitives = format!("<polylist>{VERTEX}<vcount>5</vcount><p>4 0 1 2 3</p></polylist>");
+    let text = document(&primitives, "", NODE).replace("0 0 0 1 0 0 1 1 0 0 1 0 0.5 2 0", pos);
+    let mesh = load_text(&text).unwrap().mesh;
+    let area = |[a, b, c]: [u32; 3]| {
+        let [a, b, c] = [a, b, c].map(|vertex| mesh.positions[vertex as usize]);
+        0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    };
+    let areas: Vec<f64> = mesh.triangles.iter().map(|&triangle| area(triangle)).collect();
+    assert!(areas.len() == 3 && areas.iter().all(|&area| area > 0.0), "{areas:?}");
+    assert_eq!(areas.iter().sum::<f64>(), 10.0);
+}
+
+#[test]
 fn lines_are_skipped_and_holes_filled_with_a_warning() {
     let primitives =
         format!("<lines>{VERTEX}<p>0 1</p></lines><polygons>{VERTEX}<ph><p>0 1 2 3</p><h>0 1 2</h></ph></polygons>");

@@ -9,6 +9,7 @@ use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
 use super::json::Document;
+use crate::read::text::without_byte_order_mark;
 use crate::read::{Problem, Resources};
 
 /// The JSON of a document and, for GLB, the bytes that come with it.
@@ -22,7 +23,7 @@ impl<'a> Container<'a> {
     /// Takes GLB apart; anything that does not begin with its magic is JSON.
     pub(super) fn open(bytes: &'a [u8]) -> Result<Self, Problem> {
         if !bytes.starts_with(b"glTF") {
-            let json = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+            let json = without_byte_order_mark(bytes);
             return Ok(Self { json, binary: None, warnings: Vec::new() });
         }
         let mut warnings = Vec::new();

@@ -6,8 +6,9 @@ use trixel::Attribute;
 
 use super::accessor::Accessors;
 use super::json::{Attributes, Primitive, Target};
+use crate::numbers::narrow;
 use crate::read::Problem;
-use crate::read::assemble::{Budget, Part, narrow};
+use crate::read::assemble::{Budget, Part};
 
 /// Decodes meshes, and counts what it leaves out.
 pub(super) struct Meshes<'a> {

@@ -14,7 +14,7 @@ use trixel::{Attribute, Filter, Image, ImageSource, Material, Mesh, Texture, Tex
 
 use self::model::{Group, Model, Object, Property, Reference};
 use self::package::Package;
-use super::assemble::{Assembly, Budget, Part};
+use super::assemble::{Assembly, Budget, CornerAttribute, Part};
 use super::instances::{Child, walk};
 use super::{Loaded, Problem, ReadOptions, Resources};
 
@@ -165,8 +165,8 @@ impl Properties<'_> {
         if !out.materials.is_empty() {
             out.materials.resize(out.triangles.len(), Mesh::NO_MATERIAL);
         }
-        out.colors = colors.finish(out.triangles.len());
-        if let Some(uvs) = uvs.finish(out.triangles.len()) {
+        out.colors = colors.attribute.finish(out.triangles.len());
+        if let Some(uvs) = uvs.attribute.finish(out.triangles.len()) {
             out.uvs.push(Some(uvs));
         }
         out
@@ -222,14 +222,13 @@ impl Properties<'_> {
 
 /// Gathers values on corners, each entry of a group once.
 struct Corners<T> {
-    values: Vec<T>,
-    corners: Vec<[u32; 3]>,
+    attribute: CornerAttribute<T>,
     known: HashMap<(u32, u32), u32>,
 }
 
 impl<T> Default for Corners<T> {
     fn default() -> Self {
-        Self { values: Vec::new(), corners: Vec::new(), known: HashMap::new() }
+        Self { attribute: CornerAttribute::default(), known: HashMap::new() }
     }
 }
 
@@ -246,23 +245,15 @@ impl<T: Copy> Corners<T> {
             *corner = match self.known.get(&(group, entry)) {
                 Some(&known) => known,
                 None => {
-                    let index = u32::try_from(self.values.len()).ok()?;
-                    self.values.push(value(entry as usize)?);
+                    let values = &mut self.attribute.values;
+                    let index = u32::try_from(values.len()).ok()?;
+                    values.push(value(entry as usize)?);
                     self.known.insert((group, entry), index);
                     index
                 }
             };
         }
-        self.corners.resize(triangle, [Attribute::<T>::NONE; 3]);
-        self.corners.push(corners);
+        self.attribute.push(triangle, corners);
         Some(())
-    }
-
-    fn finish(mut self, triangles: usize) -> Option<Attribute<T>> {
-        if self.values.is_empty() {
-            return None;
-        }
-        self.corners.resize(triangles, [Attribute::<T>::NONE; 3]);
-        Some(Attribute { values: self.values, corners: Some(self.corners) })
     }
 }

@@ -8,8 +8,10 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use super::package::part_name;
+use crate::numbers::narrow;
 use crate::read::Problem;
-use crate::read::assemble::linear_from_srgb;
+use crate::read::color::linear;
+use crate::read::text::shown;
 use crate::read::transform::Affine;
 
 /// What a model part holds.
@@ -434,20 +436,20 @@ fn unescaped(value: &str) -> Result<std::borrow::Cow<'_, str>, String> {
 }
 
 fn number(text: &str) -> Result<f64, String> {
-    text.trim().parse().map_err(|_| format!("'{}' is not a number; the file is damaged", shortened(text)))
+    text.trim().parse().map_err(|_| format!("'{}' is not a number; the file is damaged", shown(text.as_bytes())))
 }
 
 fn coordinate(text: &str) -> Result<f32, String> {
-    number(text).map(crate::read::assemble::narrow)
+    number(text).map(narrow)
 }
 
 fn index(text: &str) -> Result<u32, String> {
-    text.trim().parse().map_err(|_| format!("'{}' is not an index; the file is damaged", shortened(text)))
+    text.trim().parse().map_err(|_| format!("'{}' is not an index; the file is damaged", shown(text.as_bytes())))
 }
 
 /// `#RRGGBB` or `#RRGGBBAA`, sRGB.
 fn color(text: &str) -> Result<[f32; 4], String> {
-    let bad = || format!("'{}' is not a colour of the form #RRGGBB or #RRGGBBAA", shortened(text));
+    let bad = || format!("'{}' is not a colour of the form #RRGGBB or #RRGGBBAA", shown(text.as_bytes()));
     let digits = text.trim().strip_prefix('#').ok_or_else(bad)?;
     if !matches!(digits.len(), 6 | 8) || !digits.is_ascii() {
         return Err(bad());
@@ -457,11 +459,5 @@ fn color(text: &str) -> Result<[f32; 4], String> {
         let pair = std::str::from_utf8(pair).map_err(|_| bad())?;
         *channel = f32::from(u8::from_str_radix(pair, 16).map_err(|_| bad())?) / 255.0;
     }
-    let [r, g, b, a] = rgba;
-    Ok([linear_from_srgb(r), linear_from_srgb(g), linear_from_srgb(b), a])
-}
-
-/// The beginning of a text, for messages.
-fn shortened(text: &str) -> &str {
-    text.char_indices().nth(40).map_or(text, |(end, _)| &text[..end])
+    Ok(linear(rgba))
 }

@@ -1,8 +1,8 @@
-//! A COLLADA document in memory: its elements refer to each other by id in any order.
+//! A small XML document in memory, for formats whose elements refer to each other by id or attribute in any order.
 //!
 //! Own code over `quick-xml` instead of a DOM crate: `roxmltree` keeps for each element every namespace in scope, which
 //! a few megabytes of nested declarations turn into gigabytes. Here names lose their prefix, entities other than the
-//! predefined ones are refused, and neither building nor dropping the tree recurses.
+//! predefined ones are refused, and neither building nor dropping the tree recurses; memory is in proportion to the text.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -10,10 +10,10 @@ use std::collections::HashMap;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-use crate::read::Problem;
+use crate::read::{Problem, shown};
 
 /// All elements of a document, parents before children.
-pub(super) struct Document<'a> {
+pub(crate) struct Document<'a> {
     elements: Vec<Data<'a>>,
     ids: HashMap<Cow<'a, str>, usize>,
 }
@@ -28,7 +28,7 @@ struct Data<'a> {
 
 /// One element of a document.
 #[derive(Clone, Copy)]
-pub(super) struct Element<'d> {
+pub(crate) struct Element<'d> {
     document: &'d Document<'d>,
     data: &'d Data<'d>,
     index: usize,
@@ -36,7 +36,7 @@ pub(super) struct Element<'d> {
 
 impl<'a> Document<'a> {
     /// Parses `text`.
-    pub(super) fn parse(text: &'a str) -> Result<Self, Problem> {
+    pub(crate) fn parse(text: &'a str) -> Result<Self, Problem> {
         /// An element that is not closed yet, and its last child.
         struct Open {
             element: usize,
@@ -101,22 +101,22 @@ impl<'a> Document<'a> {
     }
 
     /// The root element.
-    pub(super) fn root(&self) -> Option<Element<'_>> {
+    pub(crate) fn root(&self) -> Option<Element<'_>> {
         self.element(0)
     }
 
     /// The element that `#id` refers to; other documents are not read.
-    pub(super) fn find(&self, url: &str) -> Option<Element<'_>> {
+    pub(crate) fn find(&self, url: &str) -> Option<Element<'_>> {
         self.element(*self.ids.get(url.trim().strip_prefix('#')?)?)
     }
 
     /// The element whose id is `id`.
-    pub(super) fn by_id(&self, id: &str) -> Option<Element<'_>> {
+    pub(crate) fn by_id(&self, id: &str) -> Option<Element<'_>> {
         self.element(*self.ids.get(id.trim())?)
     }
 
     /// Every element called `name`, in the order of the document.
-    pub(super) fn all<'d>(&'d self, name: &'d str) -> impl Iterator<Item = Element<'d>> {
+    pub(crate) fn all<'d>(&'d self, name: &'d str) -> impl Iterator<Item = Element<'d>> {
         (0..self.elements.len()).filter_map(|i| self.element(i)).filter(move |element| element.name() == name)
     }
 
@@ -144,39 +144,39 @@ fn attribute<'t>(tag: &'t BytesStart<'_>, name: &str) -> Option<Cow<'t, str>> {
 
 impl<'d> Element<'d> {
     /// A number that no other element of the document has.
-    pub(super) fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         self.index
     }
 
     /// The element's name without prefix.
-    pub(super) fn name(self) -> &'d str {
+    pub(crate) fn name(self) -> &'d str {
         let name = self.data.tag.name().0;
         name.split_once(':').map_or(name, |(_, local)| local)
     }
 
     /// The text directly in the element.
-    pub(super) fn text(self) -> &'d str {
+    pub(crate) fn text(self) -> &'d str {
         &self.data.text
     }
 
     /// An attribute without prefix.
-    pub(super) fn attribute(self, name: &str) -> Option<Cow<'d, str>> {
+    pub(crate) fn attribute(self, name: &str) -> Option<Cow<'d, str>> {
         attribute(&self.data.tag, name)
     }
 
     /// The element that attribute `name` refers to as `#id`.
-    pub(super) fn target(self, name: &str) -> Option<Element<'d>> {
+    pub(crate) fn target(self, name: &str) -> Option<Element<'d>> {
         self.document.find(&self.attribute(name)?)
     }
 
     /// The children in order.
-    pub(super) fn children(self) -> impl Iterator<Item = Element<'d>> {
+    pub(crate) fn children(self) -> impl Iterator<Item = Element<'d>> {
         let first = self.data.first_child.and_then(|i| self.document.element(i));
         std::iter::successors(first, |child| self.document.element(child.data.next_sibling?))
     }
 
     /// The children called `name`.
-    pub(super) fn all<'n>(self, name: &'n str) -> impl Iterator<Item = Element<'d>> + use<'d, 'n> {
+    pub(crate) fn all<'n>(self, name: &'n str) -> impl Iterator<Item = Element<'d>> + use<'d, 'n> {
         let first = self.data.first_child.and_then(|i| self.document.element(i));
         let document = self.document;
         std::iter::successors(first, move |child| document.element(child.data.next_sibling?))
@@ -184,12 +184,12 @@ impl<'d> Element<'d> {
     }
 
     /// The first child called `name`.
-    pub(super) fn child(self, name: &str) -> Option<Element<'d>> {
+    pub(crate) fn child(self, name: &str) -> Option<Element<'d>> {
         self.children().find(|child| child.name() == name)
     }
 
     /// The element for messages: its name, and its id or where it is used.
-    pub(super) fn describe(self) -> String {
+    pub(crate) fn describe(self) -> String {
         match self.attribute("id").or_else(|| self.attribute("name")) {
             Some(id) => format!("<{} id=\"{id}\">", self.name()),
             None => format!("<{}>", self.name()),
@@ -197,36 +197,65 @@ impl<'d> Element<'d> {
     }
 
     /// A problem in this element.
-    pub(super) fn problem(self, what: impl Into<String>) -> Problem {
+    pub(crate) fn problem(self, what: impl Into<String>) -> Problem {
         Problem::new(self.describe(), what)
     }
 
     /// The numbers in the element's text.
-    pub(super) fn numbers(self) -> Result<Vec<f64>, Problem> {
+    pub(crate) fn numbers(self) -> Result<Vec<f64>, Problem> {
         let number = |token: &str| {
-            let bad = || self.problem(format!("'{}' is not a number; the file is damaged", shortened(token)));
+            let bad = || self.problem(format!("'{}' is not a number; the file is damaged", shown(token.as_bytes())));
             token.parse::<f64>().map_err(|_| bad())
         };
         self.text().split_ascii_whitespace().map(number).collect()
     }
 
     /// The indices in the element's text; negative ones, which mean "none", become `u32::MAX`.
-    pub(super) fn indices(self) -> Result<Vec<u32>, Problem> {
+    pub(crate) fn indices(self) -> Result<Vec<u32>, Problem> {
         let index = |token: &str| {
-            let bad = || self.problem(format!("'{}' is not an index; the file is damaged", shortened(token)));
+            let bad = || self.problem(format!("'{}' is not an index; the file is damaged", shown(token.as_bytes())));
             token.parse::<i64>().map(|i| u32::try_from(i).unwrap_or(u32::MAX)).map_err(|_| bad())
         };
         self.text().split_ascii_whitespace().map(index).collect()
     }
 
     /// An attribute that is a whole number, or `default` where it is missing.
-    pub(super) fn integer(self, name: &str, default: usize) -> Result<usize, Problem> {
+    pub(crate) fn integer(self, name: &str, default: usize) -> Result<usize, Problem> {
         let Some(value) = self.attribute(name) else { return Ok(default) };
-        let bad = || self.problem(format!("{name}=\"{}\" is not a whole number", shortened(&value)));
+        let bad = || self.problem(format!("{name}=\"{}\" is not a whole number", shown(value.as_bytes())));
         value.trim().parse().map_err(|_| bad())
     }
 }
 
-fn shortened(text: &str) -> &str {
-    text.char_indices().nth(40).map_or(text, |(end, _)| &text[..end])
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_lose_their_prefix_and_text_is_joined() {
+        let document =
+            Document::parse("<?xml version=\"1.0\"?><a:b><c id=\"1\">x<!-- y -->&amp;<![CDATA[<z>]]></c><d/></a:b>");
+        let document = document.unwrap();
+        let root = document.root().unwrap();
+        assert_eq!((root.name(), root.child("c").unwrap().text()), ("b", "x&<z>"));
+        assert_eq!(root.children().map(Element::name).collect::<Vec<_>>(), ["c", "d"]);
+        assert_eq!(document.find("#1").unwrap().name(), "c");
+    }
+
+    #[test]
+    fn what_is_not_well_formed_is_refused() {
+        for text in ["", "<a>", "<a></b>", "<a/><b/>", "<a>&unknown;</a>", "</a>", "text", "<a", "<a><![CDATA["] {
+            assert!(Document::parse(text).is_err(), "{text}");
+        }
+    }
+
+    /// Each level declares a namespace: a tree that lists for each element those in scope takes memory for 2^31 of them.
+    #[test]
+    fn nested_namespaces_take_memory_in_proportion() {
+        let levels = 1 << 16;
+        let mut text: String = (0..levels).map(|i| format!("<a xmlns:n{i}=\"u{i}\">")).collect();
+        text.extend((0..levels).map(|_| "</a>"));
+        let document = Document::parse(&text).unwrap();
+        assert_eq!(document.all("a").count(), levels);
+    }
 }
