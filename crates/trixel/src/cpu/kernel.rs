@@ -6,7 +6,7 @@
 //! | box | path |
 //! |---|---|
 //! | one voxel along at least two axes, where touching is enough | the box itself |
-//! | at most two voxels along each axis | [`tiny`]: eight triangles at a time |
+//! | at most four voxels along each axis | [`tiny`]: eight triangles at a time |
 //! | at most 64 voxels | [`rows`]: eight columns at a time |
 //! | larger | [`large`]: runs that follow lines |
 
@@ -79,38 +79,14 @@ pub(super) fn surface<V: Simd, R: SurfaceRule, C: Coordinate>(
     sink: &mut impl Sink,
 ) {
     let mut scratch = Scratch::default();
-    let mut cubes = tiny::Cubes::new();
-    let mut flats = tiny::Flats::new();
+    let mut tiny = Tiny::new();
     triangles.for_each(
         #[inline(always)]
         |triangle| {
             let around = VoxelBox::around(triangle);
             let extent = around.extent();
-            // 0 where no axis has an extent, 1 where no axis has more than 1.
-            if extent[0] | extent[1] | extent[2] <= 1 && around.is_inside(clip) {
-                let axes = extent[0] + extent[1] + extent[2];
-                if !R::TOUCH_IS_ENOUGH || axes == 3 {
-                    if cubes.push(triangle, around.low, extent) {
-                        simd.vectorize(
-                            #[inline(always)]
-                            || cubes.flush(simd, rule, sink),
-                        );
-                    }
-                } else if axes == 2 {
-                    if flats.push(triangle, around.low, extent) {
-                        simd.vectorize(
-                            #[inline(always)]
-                            || flats.flush(simd, rule, sink),
-                        );
-                    }
-                } else {
-                    // Strictly inside a row of one or two voxels, and connected: it meets them all.
-                    let bits = 1
-                        | extent[2].cast_unsigned() << 1
-                        | extent[1].cast_unsigned() << 2
-                        | extent[0].cast_unsigned() << 4;
-                    sink.cube(around.low, bits);
-                }
+            if extent[0] | extent[1] | extent[2] <= 3 && around.is_inside(clip) {
+                tiny.push(simd, rule, triangle, around.low, extent, sink);
                 return;
             }
             let Some(clipped) = around.clipped(clip) else { return };
@@ -126,8 +102,104 @@ pub(super) fn surface<V: Simd, R: SurfaceRule, C: Coordinate>(
             by_size(simd, rule, triangle, &around, &clipped, sink, &mut scratch);
         },
     );
-    cubes.flush(simd, rule, sink);
-    flats.flush(simd, rule, sink);
+    tiny.flush(simd, rule, sink);
+}
+
+/// `extent + 1` bits, `step` apart.
+#[inline(always)]
+fn row_bits(extent: i64, step: u32) -> u64 {
+    let all = 1 | 1 << step | 1 << (2 * step) | 1 << (3 * step);
+    all & ((2 << (extent * i64::from(step))) - 1)
+}
+
+/// The batches of tiny triangles, by the size of their boxes.
+struct Tiny {
+    cubes2: tiny::Cubes<2>,
+    cubes3: tiny::Cubes<3>,
+    cubes4: tiny::Cubes<4>,
+    flats2: tiny::Flats<2>,
+    flats4: tiny::Flats<4>,
+}
+
+impl Tiny {
+    fn new() -> Self {
+        Self {
+            cubes2: tiny::Cubes::new(),
+            cubes3: tiny::Cubes::new(),
+            cubes4: tiny::Cubes::new(),
+            flats2: tiny::Flats::new(),
+            flats4: tiny::Flats::new(),
+        }
+    }
+
+    /// Takes a triangle whose box, at `low`, has at most four voxels along each axis and lies inside the clip.
+    #[inline(always)]
+    fn push<V: Simd, R: SurfaceRule>(
+        &mut self,
+        simd: V,
+        rule: &R,
+        triangle: &[[i64; 3]; 3],
+        low: [i64; 3],
+        extent: [i64; 3],
+        sink: &mut impl Sink,
+    ) {
+        let longest = extent[0].max(extent[1]).max(extent[2]);
+        if R::TOUCH_IS_ENOUGH {
+            let axes = extent[0].min(1) + extent[1].min(1) + extent[2].min(1);
+            if axes <= 1 {
+                // Strictly inside a row of voxels, and connected: it meets them all. Bits of a cube of four.
+                let bits = row_bits(extent[2], 1) | row_bits(extent[1], 4) | row_bits(extent[0], 16);
+                sink.cube::<4>(low, bits);
+                return;
+            }
+            if axes == 2 {
+                if longest <= 1 {
+                    if self.flats2.push(triangle, low, extent) {
+                        simd.vectorize(
+                            #[inline(always)]
+                            || self.flats2.flush(simd, rule, sink),
+                        );
+                    }
+                } else if self.flats4.push(triangle, low, extent) {
+                    simd.vectorize(
+                        #[inline(always)]
+                        || self.flats4.flush(simd, rule, sink),
+                    );
+                }
+                return;
+            }
+        }
+        if longest <= 1 {
+            if self.cubes2.push(triangle, low, extent) {
+                simd.vectorize(
+                    #[inline(always)]
+                    || self.cubes2.flush(simd, rule, sink),
+                );
+            }
+        } else if longest <= 2 {
+            if self.cubes3.push(triangle, low, extent) {
+                simd.vectorize(
+                    #[inline(always)]
+                    || self.cubes3.flush(simd, rule, sink),
+                );
+            }
+        } else if self.cubes4.push(triangle, low, extent) {
+            simd.vectorize(
+                #[inline(always)]
+                || self.cubes4.flush(simd, rule, sink),
+            );
+        }
+    }
+
+    /// Sends the voxels of all triangles that still wait.
+    #[inline(always)]
+    fn flush<V: Simd, R: SurfaceRule>(&mut self, simd: V, rule: &R, sink: &mut impl Sink) {
+        self.cubes2.flush(simd, rule, sink);
+        self.cubes3.flush(simd, rule, sink);
+        self.cubes4.flush(simd, rule, sink);
+        self.flats2.flush(simd, rule, sink);
+        self.flats4.flush(simd, rule, sink);
+    }
 }
 
 /// Sends the voxels of a mode that looks along z from voxel centres to `sink`.

@@ -37,14 +37,28 @@ pub(super) trait Rule: Copy + Send + Sync {
     fn plane<T: Int>(&self, n: [T; 3], v0: [i64; 3]) -> (T, T);
 }
 
-/// What a surface mode adds to its tests in lattice steps, for triangles so small that floats are exact: an edge is
-/// `n . (S p - v) + edge_reach >= 0`, the plane `-above <= N . (S p - v0) <= -below`.
+/// A surface mode's tests for triangles of at most four voxels along each axis, so small that floats are exact.
 pub(super) trait SurfaceRule: Rule {
-    /// The reach of an edge with inward normal `(na, nb)`.
+    /// The reach of an edge with inward normal `(na, nb)` in steps: a voxel passes where
+    /// `n . (S p - v) + edge_reach >= 0`.
     fn edge_reach<V: Simd>(&self, simd: V, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V>;
 
-    /// `(above, below)` of the plane with normal `n`.
-    fn plane_reach<V: Simd>(&self, simd: V, n: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>);
+    /// `(d1, d2)` for the normal `n`, oriented either way, and the corner `v0`, at most 2^18 in each coordinate.
+    fn plane_bounds<V: Simd>(&self, simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>);
+}
+
+/// N.p and N.r / S for `v0 = S p + r` with r within half a voxel of 0. With |N_i| at most 2^36 no term reaches 2^53.
+#[inline(always)]
+fn split_centred<V: Simd>(n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+    let steps = f64::from(STEPS_PER_VOXEL);
+    let p = [
+        (v0[0] * (1.0 / steps)).round_ties_even(),
+        (v0[1] * (1.0 / steps)).round_ties_even(),
+        (v0[2] * (1.0 / steps)).round_ties_even(),
+    ];
+    let whole = n[0] * p[0] + n[1] * p[1] + n[2] * p[2];
+    let rest = n[0] * (v0[0] - p[0] * steps) + n[1] * (v0[1] - p[1] * steps) + n[2] * (v0[2] - p[2] * steps);
+    (whole, rest * (1.0 / steps))
 }
 
 /// `N.p + floor or ceil of the rest`, where `v0 = S p + rest`: keeps the products small. Gives N.p and N.(rest + shift).
@@ -97,11 +111,12 @@ impl SurfaceRule for Conservative {
     }
 
     #[inline(always)]
-    fn plane_reach<V: Simd>(&self, simd: V, n: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+    fn plane_bounds<V: Simd>(&self, simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
         let zero = f64x8::splat(simd, 0.0);
+        let (whole, rest) = split_centred(n, v0);
         let above = n[0].max(zero) + n[1].max(zero) + n[2].max(zero);
         let below = n[0].min(zero) + n[1].min(zero) + n[2].min(zero);
-        (above * f64::from(STEPS_PER_VOXEL), below * f64::from(STEPS_PER_VOXEL))
+        (whole + rest.ceil() - above, whole + rest.floor() - below)
     }
 }
 
@@ -134,11 +149,12 @@ impl SurfaceRule for Thin {
     }
 
     #[inline(always)]
-    fn plane_reach<V: Simd>(&self, _simd: V, n: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
-        let to_centre = n[0] + n[1] + n[2];
-        let reach = n[0].abs().max(n[1].abs()).max(n[2].abs());
+    fn plane_bounds<V: Simd>(&self, _simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+        // Seen from the voxel's centre: v0 half a voxel lower, split into a whole voxel and the rest.
         let half = f64::from(STEPS_PER_VOXEL / 2);
-        ((to_centre + reach) * half, (to_centre - reach) * half)
+        let (whole, rest) = split_centred(n, [v0[0] - half, v0[1] - half, v0[2] - half]);
+        let reach = n[0].abs().max(n[1].abs()).max(n[2].abs()) * 0.5;
+        (whole + (rest - reach).ceil(), whole + (rest + reach).floor())
     }
 }
 

@@ -7,9 +7,9 @@ pub(super) trait Sink {
     /// The voxels `(x, y, from..=to)`, all inside the clip that the kernel was given.
     fn run(&mut self, x: i64, y: i64, from: i64, to: i64);
 
-    /// Voxels of the cube of two from `low` on: `low + (x, y, z)` where bit `4 x + 2 y + z` is set. The set ones are
-    /// inside the clip.
-    fn cube(&mut self, low: [i64; 3], bits: u64);
+    /// Voxels of the cube of `SIDE` from `low` on: `low + (x, y, z)` where bit `(SIDE x + y) SIDE + z` is set. The set
+    /// ones are inside the clip.
+    fn cube<const SIDE: usize>(&mut self, low: [i64; 3], bits: u64);
 }
 
 /// The words of the columns with `x` in a range: what one thread owns.
@@ -53,16 +53,20 @@ impl Sink for SetRuns<'_> {
 
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
-    fn cube(&mut self, low: [i64; 3], bits: u64) {
+    fn cube<const SIDE: usize>(&mut self, low: [i64; 3], mut bits: u64) {
         let z = low[2] as u32;
         let (word, shift) = ((z / WORD_BITS) as usize, z % WORD_BITS);
-        for i in 0..4i64 {
-            let pair = bits >> (2 * i) & 3;
-            if pair != 0 {
-                let column = self.0.column(low[0] + (i >> 1), low[1] + (i & 1));
-                column[word] |= pair << shift;
-                if shift == WORD_BITS - 1 && pair & 2 != 0 {
-                    column[word + 1] |= 1;
+        let side = SIDE as u32;
+        while bits != 0 {
+            let column = bits.trailing_zeros() / side;
+            let run = bits >> (column * side) & ((1 << side) - 1);
+            bits ^= run << (column * side);
+            let words = self.0.column(low[0] + i64::from(column / side), low[1] + i64::from(column % side));
+            words[word] |= run << shift;
+            if shift > WORD_BITS - side {
+                let above = run >> (WORD_BITS - shift);
+                if above != 0 {
+                    words[word + 1] |= above;
                 }
             }
         }
@@ -81,7 +85,7 @@ impl Sink for ToggleRuns<'_> {
     }
 
     /// Parity needs whole runs: batches are for surfaces.
-    fn cube(&mut self, low: [i64; 3], bits: u64) {
+    fn cube<const SIDE: usize>(&mut self, low: [i64; 3], bits: u64) {
         debug_assert!(false, "a batch of a solid at {low:?}: {bits:#x}");
     }
 }

@@ -1,7 +1,7 @@
-//! Triangles whose box is at most two voxels along each axis: eight at a time, one a vector lane.
+//! Triangles whose box is at most four voxels along each axis: eight at a time, one a vector lane.
 //!
-//! Everything is f64 holding integers below 2^53, so it is exact: corners are below 2^17.1 steps from the box's corner,
-//! normals below 2^34, and the plane's terms below 3 * 2^51.2.
+//! Everything is f64 holding integers below 2^53, so it is exact: corners are below 2^18 steps from the box's corner,
+//! edge functions below 2^38, normals below 2^36, and the plane's terms below 2^53 ([`SurfaceRule::plane_bounds`]).
 
 use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
 
@@ -10,31 +10,46 @@ use super::sink::Sink;
 use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
 
 /// Triangles in one batch.
-pub(super) const LANES: usize = 8;
+const LANES: usize = 8;
 
 /// S, the lattice steps of a voxel.
 const S: f64 = STEPS_PER_VOXEL as f64;
 
-/// Triangles that wait until there are enough for all lanes.
-pub(super) struct Batch<const COORDINATES: usize> {
-    /// Corners relative to the low corner of the voxel box: corner k's axis i is row `k * axes + i`.
-    corners: [[f64; LANES]; COORDINATES],
-    /// The low corner of each box, in voxels, and how many voxels it has along each axis, less one.
-    boxes: [([i64; 3], [i64; 3]); LANES],
+/// Boxes of at most `SIDE` voxels along every axis, waiting until there are enough for all lanes.
+pub(super) struct Cubes<const SIDE: usize> {
+    /// Corners relative to the low corner of the voxel box: corner k's axis i is row `3 k + i`.
+    corners: [[f64; LANES]; 9],
+    boxes: Boxes,
+}
+
+/// Boxes of at most `SIDE` voxels along two axes and one along the third.
+pub(super) struct Flats<const SIDE: usize> {
+    /// As in [`Cubes`], for the two axes of [`flat_axes`]: corner k's axis i is row `2 k + i`.
+    corners: [[f64; LANES]; 6],
+    boxes: Boxes,
+}
+
+/// The boxes of the triangles that wait.
+struct Boxes {
+    low: [[i64; 3]; LANES],
+    /// Voxels along each axis, less one.
+    extent: [[i64; 3]; LANES],
     count: usize,
 }
 
-impl<const COORDINATES: usize> Batch<COORDINATES> {
-    pub(super) fn new() -> Self {
-        Self { corners: [[0.0; LANES]; COORDINATES], boxes: [([0; 3], [0; 3]); LANES], count: 0 }
+impl Boxes {
+    const EMPTY: Self = Self { low: [[0; 3]; LANES], extent: [[0; 3]; LANES], count: 0 };
+
+    /// Adds a box and gives its lane.
+    #[inline(always)]
+    fn push(&mut self, low: [i64; 3], extent: [i64; 3]) -> usize {
+        let lane = self.count % LANES;
+        self.low[lane] = low;
+        self.extent[lane] = extent;
+        self.count += 1;
+        lane
     }
 }
-
-/// Boxes of two voxels along every axis (or, for rules without a shortcut for flat boxes, of one or two).
-pub(super) type Cubes = Batch<9>;
-
-/// Boxes of two voxels along two axes and one along the third.
-pub(super) type Flats = Batch<6>;
 
 /// Steps from the box's corner, as a float.
 #[inline(always)]
@@ -43,25 +58,27 @@ fn local(coordinate: i64, low: i64) -> f64 {
     f64::from((coordinate - (low << STEP_BITS)) as i32)
 }
 
-impl Cubes {
+impl<const SIDE: usize> Cubes<SIDE> {
+    pub(super) fn new() -> Self {
+        Self { corners: [[0.0; LANES]; 9], boxes: Boxes::EMPTY }
+    }
+
     /// Adds a triangle; `true` when the batch is full.
     #[inline(always)]
     pub(super) fn push(&mut self, triangle: &[[i64; 3]; 3], low: [i64; 3], extent: [i64; 3]) -> bool {
-        let lane = self.count % LANES;
+        let lane = self.boxes.push(low, extent);
         for k in 0..3 {
             for i in 0..3 {
                 self.corners[3 * k + i][lane] = local(triangle[k][i], low[i]);
             }
         }
-        self.boxes[lane] = (low, extent);
-        self.count += 1;
-        self.count == LANES
+        self.boxes.count == LANES
     }
 
     /// Sends the voxels of all waiting triangles to the sink.
     #[inline(always)]
     pub(super) fn flush<V: Simd, R: SurfaceRule>(&mut self, simd: V, rule: &R, sink: &mut impl Sink) {
-        if self.count == 0 {
+        if self.boxes.count == 0 {
             return;
         }
         let c = &self.corners;
@@ -70,83 +87,81 @@ impl Cubes {
         let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
         let n = [cross(&e, 1, 2), cross(&e, 2, 0), cross(&e, 0, 1)];
 
-        // In each projection, the least of the three edge functions at the four voxels (a, b).
-        let xy = edges_at_four(simd, rule, pick(&v, 0, 1), pick(&e, 0, 1), n[2]);
-        let yz = edges_at_four(simd, rule, pick(&v, 1, 2), pick(&e, 1, 2), n[0]);
-        let zx = edges_at_four(simd, rule, pick(&v, 2, 0), pick(&e, 2, 0), n[1]);
+        // In each projection, the lanes in which the voxel (a, b) passes.
+        let xy = passing::<V, R, SIDE>(simd, rule, pick(&v, 0, 1), pick(&e, 0, 1), n[2]);
+        let yz = passing::<V, R, SIDE>(simd, rule, pick(&v, 1, 2), pick(&e, 1, 2), n[0]);
+        let zx = passing::<V, R, SIDE>(simd, rule, pick(&v, 2, 0), pick(&e, 2, 0), n[1]);
 
-        // The plane: between -reach_down and +reach_up of N . (S p - v0).
-        let (above, below) = rule.plane_reach(simd, n);
-        let at_origin = -(n[0] * v[0][0] + n[1] * v[0][1] + n[2] * v[0][2]);
-        let step = [n[0] * S, n[1] * S, n[2] * S];
-        let (upper, lower) = (at_origin + above, -at_origin - below);
-
+        // The plane: d1 <= N . p <= d2.
+        let (d1, d2) = rule.plane_bounds(simd, n, v[0]);
         let zero = f64x8::splat(simd, 0.0);
-        let mut bits = [0u64; 8];
-        let mut index = 0;
-        for x in 0..2 {
-            for y in 0..2 {
-                for z in 0..2 {
-                    let mut offset = zero;
-                    for (i, on) in [x, y, z].into_iter().enumerate() {
-                        if on == 1 {
-                            offset += step[i];
-                        }
-                    }
-                    let plane = (upper + offset).min(lower - offset);
-                    let least = xy[2 * x + y].min(yz[2 * y + z]).min(zx[2 * z + x]).min(plane);
-                    bits[index] = least.simd_ge(zero).to_bitmask();
-                    index += 1;
+        let mut lanes_of_voxel = [0u8; 64];
+        let mut at_x = zero;
+        for x in 0..SIDE {
+            let mut at_y = at_x;
+            for y in 0..SIDE {
+                let mut at = at_y;
+                for z in 0..SIDE {
+                    let plane = (at - d1).min(d2 - at).simd_ge(zero).to_bitmask();
+                    let lanes = xy[x][y] & yz[y][z] & zx[z][x] & narrow(plane);
+                    lanes_of_voxel[(x * SIDE + y) * SIDE + z] = lanes;
+                    at += n[2];
                 }
+                at_y += n[1];
             }
+            at_x += n[0];
         }
-        let masks = transpose(bits);
-        for lane in 0..self.count {
-            let (low, extent) = self.boxes[lane];
-            sink.cube(low, u64::from(masks[lane]) & within(extent));
+        let voxels_of_lane = transpose(&lanes_of_voxel, SIDE * SIDE * SIDE);
+        for lane in 0..self.boxes.count {
+            let inside = within::<SIDE>(self.boxes.extent[lane]);
+            sink.cube::<SIDE>(self.boxes.low[lane], voxels_of_lane[lane] & inside);
         }
-        self.count = 0;
+        self.boxes.count = 0;
     }
 }
 
-impl Flats {
+impl<const SIDE: usize> Flats<SIDE> {
+    pub(super) fn new() -> Self {
+        Self { corners: [[0.0; LANES]; 6], boxes: Boxes::EMPTY }
+    }
+
     /// Adds a triangle whose box is one voxel thick along one axis; `true` when the batch is full.
     #[inline(always)]
     pub(super) fn push(&mut self, triangle: &[[i64; 3]; 3], low: [i64; 3], extent: [i64; 3]) -> bool {
-        let lane = self.count % LANES;
+        let lane = self.boxes.push(low, extent);
         let (a, b) = flat_axes(extent);
         for k in 0..3 {
             self.corners[2 * k][lane] = local(triangle[k][a], low[a]);
             self.corners[2 * k + 1][lane] = local(triangle[k][b], low[b]);
         }
-        self.boxes[lane] = (low, extent);
-        self.count += 1;
-        self.count == LANES
+        self.boxes.count == LANES
     }
 
     /// Sends the voxels of all waiting triangles to the sink: strictly inside their layer, they meet a voxel where their
     /// projections meet.
     #[inline(always)]
     pub(super) fn flush<V: Simd, R: SurfaceRule>(&mut self, simd: V, rule: &R, sink: &mut impl Sink) {
-        if self.count == 0 {
+        if self.boxes.count == 0 {
             return;
         }
         let c = &self.corners;
         let v = [load(simd, [&c[0], &c[1]]), load(simd, [&c[2], &c[3]]), load(simd, [&c[4], &c[5]])];
         let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
         let area = cross(&e, 0, 1);
-        let zero = f64x8::splat(simd, 0.0);
-        let four = edges_at_four(simd, rule, v, e, area);
-        let mut bits = [0u64; 8];
-        for i in 0..4 {
-            bits[i] = four[i].simd_ge(zero).to_bitmask();
+        let passing = passing::<V, R, SIDE>(simd, rule, v, e, area);
+        let mut lanes_of_voxel = [0u8; 64];
+        for a in 0..SIDE {
+            for b in 0..SIDE {
+                lanes_of_voxel[a * SIDE + b] = passing[a][b];
+            }
         }
-        let masks = transpose(bits);
-        for lane in 0..self.count {
-            let (low, extent) = self.boxes[lane];
-            sink.cube(low, spread_flat(masks[lane], extent));
+        let voxels_of_lane = transpose(&lanes_of_voxel, SIDE * SIDE);
+        for lane in 0..self.boxes.count {
+            let extent = self.boxes.extent[lane];
+            let cube = spread_flat::<SIDE>(voxels_of_lane[lane], extent) & within::<SIDE>(extent);
+            sink.cube::<SIDE>(self.boxes.low[lane], cube);
         }
-        self.count = 0;
+        self.boxes.count = 0;
     }
 }
 
@@ -185,7 +200,7 @@ fn pick<V: Simd>(of: &[[f64x8<V>; 3]; 3], a: usize, b: usize) -> [[f64x8<V>; 2];
     [[of[0][a], of[0][b]], [of[1][a], of[1][b]], [of[2][a], of[2][b]]]
 }
 
-/// The two axes along which a flat box has two voxels, ascending.
+/// The axes along which a flat box has more than one voxel, ascending.
 #[inline(always)]
 fn flat_axes(extent: [i64; 3]) -> (usize, usize) {
     if extent[2] == 0 {
@@ -197,66 +212,112 @@ fn flat_axes(extent: [i64; 3]) -> (usize, usize) {
     }
 }
 
-/// Bit `2 a + b` of a flat box to bit `4 x + 2 y + z`.
+/// Bit `SIDE a + b` of a flat box to the bit of its voxel in a cube, `(SIDE x + y) SIDE + z`.
 #[inline(always)]
-fn spread_flat(mask: u8, extent: [i64; 3]) -> u64 {
-    let mask = u64::from(mask & 0xF);
+fn spread_flat<const SIDE: usize>(mask: u64, extent: [i64; 3]) -> u64 {
+    let mut cube = 0;
     if extent[2] == 0 {
-        // (x, y): bits 0, 2, 4, 6.
-        (mask & 1) | (mask & 2) << 1 | (mask & 4) << 2 | (mask & 8) << 3
+        for i in 0..SIDE * SIDE {
+            cube |= (mask >> i & 1) << (SIDE * i);
+        }
     } else if extent[1] == 0 {
-        // (x, z): bits 0, 1, 4, 5.
-        (mask & 3) | (mask & 0xC) << 2
+        for x in 0..SIDE {
+            cube |= (mask >> (SIDE * x) & row_mask(SIDE)) << (SIDE * SIDE * x);
+        }
     } else {
-        // (y, z): bits 0 to 3.
+        cube = mask & row_mask(SIDE * SIDE);
+    }
+    cube
+}
+
+/// The lowest `bits` bits.
+#[inline(always)]
+const fn row_mask(bits: usize) -> u64 {
+    if bits >= 64 { u64::MAX } else { (1 << bits) - 1 }
+}
+
+/// The voxels of a box in the bits of a cube.
+#[inline(always)]
+fn within<const SIDE: usize>(extent: [i64; 3]) -> u64 {
+    /// Bit 0 of each of `count` groups of `width` bits.
+    const fn every(width: usize, count: usize) -> u64 {
+        let mut mask = 0;
+        let mut i = 0;
+        while i < count {
+            mask |= 1 << (width * i);
+            i += 1;
+        }
         mask
     }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to SIDE - 1")]
+    let [x, y, z] = [extent[0] as usize + 1, extent[1] as usize + 1, extent[2] as usize + 1];
+    let keep_z = row_mask(z) * every(SIDE, SIDE * SIDE);
+    let keep_y = row_mask(SIDE * y) * every(SIDE * SIDE, SIDE);
+    let keep_x = row_mask(SIDE * SIDE * x);
+    keep_x & keep_y & keep_z
 }
 
-/// The voxels of a box of one or two voxels along each axis, bit `4 x + 2 y + z`.
+/// The lanes in which all three edge functions hold at voxel (a, b), for all of a tile.
 #[inline(always)]
-fn within(extent: [i64; 3]) -> u64 {
-    let keep = |i: usize, low: u64| if extent[i] == 0 { low } else { 0xFF };
-    keep(0, 0x0F) & keep(1, 0x33) & keep(2, 0x55)
-}
-
-/// The least of three edge functions at the voxels (0, 0), (0, 1), (1, 0), (1, 1); not negative where all hold.
-#[inline(always)]
-fn edges_at_four<V: Simd, R: SurfaceRule>(
+fn passing<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
     rule: &R,
     v: [[f64x8<V>; 2]; 3],
     e: [[f64x8<V>; 2]; 3],
     area: f64x8<V>,
-) -> [f64x8<V>; 4] {
+) -> [[u8; SIDE]; SIDE] {
     let zero = f64x8::splat(simd, 0.0);
     // Inward normals point left of the edges when the projection turns left.
     let turns_right: mask64x8<V> = area.simd_lt(zero);
-    let mut least = [zero; 4];
+    let mut at = [zero; 3];
+    let mut step_a = [zero; 3];
+    let mut step_b = [zero; 3];
     for k in 0..3 {
         let na = turns_right.select(e[k][1], -e[k][1]);
         let nb = turns_right.select(-e[k][0], e[k][0]);
-        let at_origin = rule.edge_reach(simd, na, nb) - (na * v[k][0] + nb * v[k][1]);
-        let (step_a, step_b) = (na * S, nb * S);
-        let at = [at_origin, at_origin + step_b, at_origin + step_a, at_origin + step_a + step_b];
-        for i in 0..4 {
-            least[i] = if k == 0 { at[i] } else { least[i].min(at[i]) };
+        at[k] = rule.edge_reach(simd, na, nb) - (na * v[k][0] + nb * v[k][1]);
+        step_a[k] = na * S;
+        step_b[k] = nb * S;
+    }
+    let mut passing = [[0u8; SIDE]; SIDE];
+    for row in &mut passing {
+        let mut here = at;
+        for cell in row {
+            *cell = narrow(here[0].min(here[1]).min(here[2]).simd_ge(zero).to_bitmask());
+            for k in 0..3 {
+                here[k] += step_b[k];
+            }
+        }
+        for k in 0..3 {
+            at[k] += step_a[k];
         }
     }
-    least
+    passing
 }
 
-/// Lane masks of eight voxels to voxel masks of eight lanes (the transposition of an 8 x 8 bit matrix).
+/// A mask of eight lanes.
 #[inline(always)]
-fn transpose(rows: [u64; 8]) -> [u8; 8] {
-    let mut m = 0u64;
-    for (i, row) in rows.into_iter().enumerate() {
-        m |= (row & 0xFF) << (8 * i);
+#[expect(clippy::cast_possible_truncation, reason = "eight lanes")]
+fn narrow(mask: u64) -> u8 {
+    mask as u8
+}
+
+/// The lanes of up to 64 voxels to the voxels of eight lanes.
+#[inline(always)]
+fn transpose(lanes_of_voxel: &[u8; 64], voxels: usize) -> [u64; LANES] {
+    let mut voxels_of_lane = [0u64; LANES];
+    for group in 0..voxels.div_ceil(8) {
+        // Transpose a matrix of 8 x 8 bits by swapping ever larger blocks across the diagonal.
+        let bytes = &lanes_of_voxel[8 * group..8 * group + 8];
+        let mut m =
+            u64::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3], bytes[4], bytes[5], bytes[6], bytes[7]]);
+        for (shift, mask) in [(7, 0x00AA_00AA_00AA_00AA), (14, 0x0000_CCCC_0000_CCCC), (28, 0x0000_0000_F0F0_F0F0u64)] {
+            let t = (m ^ (m >> shift)) & mask;
+            m ^= t ^ (t << shift);
+        }
+        for (voxels, byte) in voxels_of_lane.iter_mut().zip(m.to_le_bytes()) {
+            *voxels |= u64::from(byte) << (8 * group);
+        }
     }
-    // Swap ever larger blocks across the diagonal.
-    for (shift, mask) in [(7, 0x00AA_00AA_00AA_00AA), (14, 0x0000_CCCC_0000_CCCC), (28, 0x0000_0000_F0F0_F0F0u64)] {
-        let t = (m ^ (m >> shift)) & mask;
-        m ^= t ^ (t << shift);
-    }
-    m.to_le_bytes()
+    voxels_of_lane
 }
