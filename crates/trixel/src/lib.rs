@@ -46,7 +46,7 @@ mod topology;
 mod volume;
 
 pub use backend::{Backend, Error, voxelize};
-pub use cpu::{CpuBackend, ThreadsError};
+pub use cpu::{CpuBackend, Instructions, ThreadsError};
 pub use grid::{Grid, GridError};
 pub use job::{Job, JobError, Strategy};
 pub use material::{AlphaMode, Filter, Image, ImageSource, Material, Texture, TextureRef, Wrap};

@@ -15,7 +15,7 @@ use fearless_simd::Simd;
 use super::number::SMALL_EXTENT;
 use super::rule::{Rule, SurfaceRule};
 use super::sink::Sink;
-use super::slabs::{Coordinate, Selected};
+use super::slabs::Selected;
 use super::{large, rows, tiny};
 use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
 
@@ -71,10 +71,10 @@ struct Scratch {
 
 /// Sends the voxels of a surface mode inside `clip` to `sink`.
 #[inline(always)]
-pub(super) fn surface<V: Simd, R: SurfaceRule, C: Coordinate>(
+pub(super) fn surface<V: Simd, R: SurfaceRule>(
     simd: V,
     rule: &R,
-    triangles: Selected<'_, C>,
+    triangles: Selected<'_>,
     clip: &VoxelBox,
     sink: &mut impl Sink,
 ) {
@@ -207,10 +207,10 @@ impl Tiny {
 /// For [`super::rule::Solid`], the sink gets runs from the lowest voxel whose centre is not below the triangle to the top
 /// of the clip; a triangle below the clip gives whole columns.
 #[inline(always)]
-pub(super) fn centres<V: Simd, R: Rule, C: Coordinate>(
+pub(super) fn centres<V: Simd, R: Rule>(
     simd: V,
     rule: &R,
-    triangles: Selected<'_, C>,
+    triangles: Selected<'_>,
     clip: &VoxelBox,
     sink: &mut impl Sink,
 ) {

@@ -2,12 +2,14 @@
 //!
 //! - `kernel`: one triangle after the other, each to the path for its size
 //! - `tiny`, `rows`, `large`: the paths
+//! - `instructions`: the vector instructions they are compiled for
 //! - `setup`: what paths compute first
 //! - `rule`: the modes as thresholds
 //! - `number`: exact integers and floor lines
 //! - `sink`: runs into bits, toggles into parity
 //! - `slabs`: the grid cut along x, one piece a task, so that threads never share a word
 
+mod instructions;
 mod kernel;
 mod large;
 mod number;
@@ -18,9 +20,11 @@ mod sink;
 mod slabs;
 mod tiny;
 
+pub use instructions::Instructions;
+
 use crate::backend::{Backend, Error};
 use crate::job::{Job, Strategy};
-use crate::lattice::{LatticeMesh, LatticePositions};
+use crate::lattice::LatticeMesh;
 use crate::mode::Mode;
 use crate::volume::Volume;
 
@@ -29,6 +33,7 @@ use crate::volume::Volume;
 pub struct CpuBackend {
     #[cfg(feature = "threads")]
     pool: Option<rayon::ThreadPool>,
+    instructions: Instructions,
 }
 
 /// The threads could not be started.
@@ -48,7 +53,14 @@ impl CpuBackend {
     pub fn with_threads(threads: usize) -> Result<Self, ThreadsError> {
         let refused = |e: rayon::ThreadPoolBuildError| ThreadsError { threads, reason: e.to_string() };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(refused)?;
-        Ok(Self { pool: Some(pool) })
+        Ok(Self { pool: Some(pool), ..Self::default() })
+    }
+
+    /// Uses no newer vector instructions than these.
+    #[must_use]
+    pub fn limited_to(mut self, instructions: Instructions) -> Self {
+        self.instructions = instructions;
+        self
     }
 
     /// The number of threads it works with.
@@ -90,25 +102,14 @@ impl Backend for CpuBackend {
         if volume.grid() != job.grid() {
             return Err(Error::GridMismatch);
         }
-        self.install(|| match &mesh.positions {
-            LatticePositions::Narrow(positions) => voxelize_mode(positions, mesh.triangles, job, volume),
-            LatticePositions::Wide(positions) => voxelize_mode(positions, mesh.triangles, job, volume),
+        let level = self.instructions.level();
+        let overlap = i64::from(job.overlap_steps());
+        self.install(|| match job.mode() {
+            Mode::Conservative => slabs::surface(level, &rule::Conservative, mesh, volume),
+            Mode::Thin => slabs::surface(level, &rule::Thin, mesh, volume),
+            Mode::Sliced => slabs::slice(level, &rule::Sliced { overlap }, mesh, volume),
+            Mode::Solid => slabs::fill(level, mesh, volume),
         });
         Ok(strategy)
-    }
-}
-
-fn voxelize_mode<C: Into<i64> + Copy + Send + Sync>(
-    positions: &[[C; 3]],
-    triangles: &[[u32; 3]],
-    job: &Job,
-    volume: &mut Volume,
-) {
-    let mesh = slabs::Corners { positions, triangles };
-    match job.mode() {
-        Mode::Conservative => slabs::surface(&rule::Conservative, mesh, volume),
-        Mode::Thin => slabs::surface(&rule::Thin, mesh, volume),
-        Mode::Sliced => slabs::slice(&rule::Sliced { overlap: i64::from(job.overlap_steps()) }, mesh, volume),
-        Mode::Solid => slabs::fill(mesh, volume),
     }
 }

@@ -8,90 +8,66 @@ use fearless_simd::{Level, dispatch};
 use super::kernel::{self, VoxelBox};
 use super::rule::{Sliced, Solid, SurfaceRule};
 use super::sink::{SetRuns, Slab, ToggleRuns, prefix_xor};
+use crate::lattice::{LatticeMesh, LatticePositions};
 use crate::volume::Volume;
 
-/// Triangles whose corners are lattice positions.
+/// Some triangles of a mesh, one after the other.
 #[derive(Clone, Copy)]
-pub(super) struct Corners<'a, C> {
-    pub(super) positions: &'a [[C; 3]],
-    pub(super) triangles: &'a [[u32; 3]],
-}
-
-/// A lattice coordinate, narrow or wide.
-pub(super) trait Coordinate: Into<i64> + Copy + Send + Sync {}
-
-impl<C: Into<i64> + Copy + Send + Sync> Coordinate for C {}
-
-/// The corners of triangles, one triangle after the other.
-#[derive(Clone, Copy)]
-pub(super) struct Selected<'a, C> {
-    corners: Corners<'a, C>,
+pub(super) struct Selected<'a> {
+    mesh: &'a LatticeMesh<'a>,
+    /// The triangles, or `None` for all.
     indices: Option<&'a [u32]>,
 }
 
-impl<C: Coordinate> Selected<'_, C> {
+impl Selected<'_> {
     /// Calls `each` with the corners of every triangle.
     #[inline(always)]
     pub(super) fn for_each(&self, mut each: impl FnMut(&[[i64; 3]; 3])) {
-        match self.indices {
-            None => {
-                for &triangle in self.corners.triangles {
-                    each(&self.corners.of(triangle));
-                }
-            }
-            Some(indices) => {
-                for &index in indices {
-                    each(&self.corners.of(self.corners.triangles[index as usize]));
-                }
-            }
+        let count = self.indices.map_or(self.mesh.triangles.len(), <[u32]>::len);
+        // One loop for both, because `each` is a whole kernel.
+        for i in 0..count {
+            let triangle = self.indices.map_or(i, |indices| indices[i] as usize);
+            each(&corners(self.mesh, self.mesh.triangles[triangle]));
         }
     }
 }
 
-impl<'a, C: Coordinate> Corners<'a, C> {
-    /// The triangles with the given indices, or all.
-    #[inline(always)]
-    fn select(self, indices: Option<&'a [u32]>) -> Selected<'a, C> {
-        Selected { corners: self, indices }
-    }
-
-    /// The corners of one triangle.
-    #[inline(always)]
-    fn of(&self, triangle: [u32; 3]) -> [[i64; 3]; 3] {
-        let corner = |vertex: u32| {
-            let [x, y, z] = self.positions[vertex as usize];
-            [x.into(), y.into(), z.into()]
-        };
-        [corner(triangle[0]), corner(triangle[1]), corner(triangle[2])]
-    }
+/// The corners of a triangle.
+#[inline(always)]
+fn corners(mesh: &LatticeMesh<'_>, [a, b, c]: [u32; 3]) -> [[i64; 3]; 3] {
+    let corner = |vertex: u32| match &mesh.positions {
+        LatticePositions::Narrow(positions) => {
+            let [x, y, z] = positions[vertex as usize];
+            [i64::from(x), i64::from(y), i64::from(z)]
+        }
+        LatticePositions::Wide(positions) => positions[vertex as usize],
+    };
+    [corner(a), corner(b), corner(c)]
 }
 
 /// Clears the volume and sets the voxels of a surface mode.
-pub(super) fn surface<R: SurfaceRule, C: Coordinate>(rule: &R, mesh: Corners<'_, C>, volume: &mut Volume) {
-    let level = Level::new();
+pub(super) fn surface<R: SurfaceRule>(level: Level, rule: &R, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
     for_each_slab(mesh, volume, |slab, clip, triangles| {
         let mut sink = SetRuns(slab);
-        dispatch!(level, simd => kernel::surface(simd, rule, mesh.select(triangles), clip, &mut sink));
+        dispatch!(level, simd => kernel::surface(simd, rule, Selected { mesh, indices: triangles }, clip, &mut sink));
     });
 }
 
 /// Clears the volume and sets the voxels of [`crate::Mode::Sliced`].
-pub(super) fn slice<C: Coordinate>(rule: &Sliced, mesh: Corners<'_, C>, volume: &mut Volume) {
-    let level = Level::new();
+pub(super) fn slice(level: Level, rule: &Sliced, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
     for_each_slab(mesh, volume, |slab, clip, triangles| {
         let mut sink = SetRuns(slab);
-        dispatch!(level, simd => kernel::centres(simd, rule, mesh.select(triangles), clip, &mut sink));
+        dispatch!(level, simd => kernel::centres(simd, rule, Selected { mesh, indices: triangles }, clip, &mut sink));
     });
 }
 
 /// Clears the volume and sets the voxels inside the mesh.
-pub(super) fn fill<C: Coordinate>(mesh: Corners<'_, C>, volume: &mut Volume) {
-    let level = Level::new();
+pub(super) fn fill(level: Level, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
     let nz = volume.grid().dims()[2];
     for_each_slab(mesh, volume, |slab, clip, triangles| {
         let column_words = slab.column_words;
         let mut sink = ToggleRuns(slab);
-        dispatch!(level, simd => kernel::centres(simd, &Solid, mesh.select(triangles), clip, &mut sink));
+        dispatch!(level, simd => kernel::centres(simd, &Solid, Selected { mesh, indices: triangles }, clip, &mut sink));
         prefix_xor(sink.0.words, column_words, nz);
     });
 }
@@ -103,8 +79,8 @@ fn clip_of(volume_dims: [u32; 3], x_range: std::ops::Range<u32>) -> VoxelBox {
 }
 
 #[cfg_attr(not(feature = "threads"), expect(unused_variables, reason = "only sorting looks at the mesh"))]
-fn for_each_slab<C: Coordinate>(
-    mesh: Corners<'_, C>,
+fn for_each_slab(
+    mesh: &LatticeMesh<'_>,
     volume: &mut Volume,
     work: impl Fn(Slab<'_>, &VoxelBox, Option<&[u32]>) + Send + Sync,
 ) {
@@ -113,7 +89,9 @@ fn for_each_slab<C: Coordinate>(
         /// Below this many triangles' worth of work, sorting and waking threads costs more than it saves.
         const WORTH_THREADS: u64 = 2000;
         let threads = rayon::current_num_threads();
-        if threads > 1 && volume.grid().dims()[0] > 1 && parallel::weight_at_least(mesh, volume, WORTH_THREADS) {
+        // Sorted triangles are 32-bit indices.
+        let sortable = volume.grid().dims()[0] > 1 && u32::try_from(mesh.triangles.len()).is_ok();
+        if threads > 1 && sortable && parallel::weight_at_least(mesh, volume, WORTH_THREADS) {
             parallel::for_each_slab(mesh, volume, threads, work);
             return;
         }
@@ -129,7 +107,7 @@ fn for_each_slab<C: Coordinate>(
 mod parallel {
     use rayon::prelude::*;
 
-    use super::{Coordinate, Corners, Slab, VoxelBox, clip_of};
+    use super::{LatticeMesh, Slab, VoxelBox, clip_of, corners};
     use crate::volume::Volume;
 
     /// Triangles sorted by one task.
@@ -152,11 +130,11 @@ mod parallel {
         8 + u64::try_from(columns).unwrap_or(0)
     }
 
-    pub(super) fn weight_at_least<C: Coordinate>(mesh: Corners<'_, C>, volume: &Volume, limit: u64) -> bool {
+    pub(super) fn weight_at_least(mesh: &LatticeMesh<'_>, volume: &Volume, limit: u64) -> bool {
         let [nx, ny, _] = volume.grid().dims().map(i64::from);
         let mut total = 0;
         for &triangle in mesh.triangles {
-            let corners = mesh.of(triangle);
+            let corners = corners(mesh, triangle);
             if let Some([low, high]) = x_range(&corners, nx) {
                 total += (high - low + 1) as u64 * weight_per_x(&corners, ny);
                 if total >= 8 * limit {
@@ -168,8 +146,8 @@ mod parallel {
         volume.words().len() > 1 << 18
     }
 
-    pub(super) fn for_each_slab<C: Coordinate>(
-        mesh: Corners<'_, C>,
+    pub(super) fn for_each_slab(
+        mesh: &LatticeMesh<'_>,
         volume: &mut Volume,
         threads: usize,
         work: impl Fn(Slab<'_>, &VoxelBox, Option<&[u32]>) + Send + Sync,
@@ -199,7 +177,7 @@ mod parallel {
     }
 
     /// Where to cut x so that each of up to `pieces` slabs holds about the same work; first 0, last nx.
-    fn cut<C: Coordinate>(mesh: Corners<'_, C>, dims: [u32; 3], pieces: usize) -> Vec<u32> {
+    fn cut(mesh: &LatticeMesh<'_>, dims: [u32; 3], pieces: usize) -> Vec<u32> {
         let nx = dims[0] as usize;
         let [nx_signed, ny, _] = dims.map(i64::from);
         // Differences of the work at each x, so that a triangle costs two additions however long it is.
@@ -210,7 +188,7 @@ mod parallel {
                 || vec![0i64; nx + 1],
                 |mut differences, chunk| {
                     for &triangle in chunk {
-                        let corners = mesh.of(triangle);
+                        let corners = corners(mesh, triangle);
                         if let Some([low, high]) = x_range(&corners, nx_signed) {
                             #[expect(clippy::cast_possible_wrap, reason = "at most the grid's columns along y")]
                             let weight = weight_per_x(&corners, ny) as i64;
@@ -249,7 +227,7 @@ mod parallel {
     }
 
     /// The indices of the triangles that meet each slab.
-    fn sort<C: Coordinate>(mesh: Corners<'_, C>, dims: [u32; 3], cuts: &[u32]) -> Vec<Vec<u32>> {
+    fn sort(mesh: &LatticeMesh<'_>, dims: [u32; 3], cuts: &[u32]) -> Vec<Vec<u32>> {
         let slabs = cuts.len() - 1;
         let mut slab_of_x = vec![0u32; dims[0] as usize];
         for (slab, range) in (0u32..).zip(cuts.windows(2)) {
@@ -262,9 +240,8 @@ mod parallel {
             .enumerate()
             .map(|(chunk, triangles)| {
                 let mut lists = vec![Vec::new(); slabs];
-                // Indices fit: a mesh has at most 2^32 triangles, or `Corners` is cut before it comes here.
                 for (index, &triangle) in (chunk * CHUNK..).zip(triangles) {
-                    if let Some([low, high]) = x_range(&mesh.of(triangle), nx) {
+                    if let Some([low, high]) = x_range(&corners(mesh, triangle), nx) {
                         for slab in slab_of_x[low]..=slab_of_x[high] {
                             #[expect(clippy::cast_possible_truncation, reason = "checked by the caller")]
                             lists[slab as usize].push(index as u32);
