@@ -246,7 +246,7 @@ fn failures_exit_with_1_and_say_what_to_do() {
         ("voxelize far.obj -o a.npz --voxel-size 1", &["voxels"]),
         ("voxelize far.obj -o a.npz --voxel-size 1 --dims 4 4 4", &["far.obj", "vertex 1", "16,777,216"]),
         ("voxelize point.obj -o a.npz", &["single point", "voxel size"]),
-        ("voxelize points.obj -o a.npz", &["points.obj", "no triangles"]),
+        ("voxelize points.obj -o a.npz", &["points.obj", "no triangle"]),
         ("voxelize index.obj -o a.npz", &["index.obj", "9"]),
         ("voxelize t.obj -o a.xyz", &["a.xyz", ".npz", ".png"]),
         ("voxelize t.obj -o a", &["a", ".npz"]),
