@@ -8,6 +8,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use trixel::lattice::LatticeMesh;
 use trixel::{Backend, Bytes, CpuBackend, Job, Mode, Topology, Volume};
+use trixel_io::VolumeFormat;
 use trixel_io::atomic_file::{AtomicFile, Staged};
 use trixel_io::write::WriteOptions;
 
@@ -147,8 +148,15 @@ impl<T, E: std::error::Error + Send + Sync + 'static> ContextOf<T> for std::resu
 fn check_paths(input: &str, outputs: &[PathBuf], report: Option<&Path>) -> Result<()> {
     let mut seen = BTreeSet::new();
     for path in outputs.iter().map(PathBuf::as_path).chain(report) {
-        if !seen.insert(path) {
-            usage(&format!("{} is given twice as an output", path.display()));
+        // However it is spelled; links are followed only where the folder exists, as it must for writing.
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        let full = folder.join(path.file_name().unwrap_or_default());
+        let sidecar = (VolumeFormat::from_path(path) == Some(VolumeFormat::Raw)).then(|| full.with_extension("json"));
+        for file in std::iter::once(full).chain(sidecar) {
+            if !seen.insert(file) {
+                usage(&format!("{} would be written twice; give each output its own name", path.display()));
+            }
         }
         let same_file = match (path.canonicalize(), Path::new(input).canonicalize()) {
             (Ok(output), Ok(input)) => output == input,

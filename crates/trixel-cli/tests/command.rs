@@ -219,6 +219,8 @@ fn wrong_usage_exits_with_2() {
         ("voxelize scene:cube -o a.npz --threads 0", &["0"]),
         ("voxelize scene:cube -o a.npz --repeat 0", &["0"]),
         ("voxelize scene:cube -o a.npz -o a.npz", &["twice"]),
+        ("voxelize scene:cube -o a.npz -o ./a.npz", &["twice"]),
+        ("voxelize scene:cube -o a.raw --report a.json", &["a.json", "twice"]),
         ("voxelise scene:cube", &["voxelize"]),
         ("verify a.npz", &["MESH"]),
     ] {
@@ -235,6 +237,8 @@ fn failures_exit_with_1_and_say_what_to_do() {
     bench.write("point.obj", "v 1 1 1\nf 1 1 1\n");
     bench.write("points.obj", "v 1 1 1\nv 2 2 2\n");
     bench.write("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
+    bench.write("vast.obj", "v -1e308 0 0\nv 1e308 0 0\nv 0 1e308 0\nf 1 2 3\n");
+    bench.write("denormal.obj", "v 0 0 0\nv 1e-320 0 0\nv 0 1e-320 0\nf 1 2 3\n");
     bench.write("what.xyz", "1 2 3\n");
     bench.write("broken.npz", "PK");
     for (arguments, words) in [
@@ -245,6 +249,9 @@ fn failures_exit_with_1_and_say_what_to_do() {
         ("voxelize nan.obj -o a.npz", &["nan.obj", "vertex 1"]),
         ("voxelize far.obj -o a.npz --voxel-size 1", &["voxels"]),
         ("voxelize far.obj -o a.npz --voxel-size 1 --dims 4 4 4", &["far.obj", "vertex 1", "16,777,216"]),
+        ("voxelize vast.obj -o a.npz", &["inf", "scale the mesh"]),
+        ("voxelize vast.obj -o a.npz --voxel-size 1e306", &["32768"]),
+        ("voxelize denormal.obj -o a.npz", &["e-320", "scale the mesh"]),
         ("voxelize point.obj -o a.npz", &["single point", "voxel size"]),
         ("voxelize points.obj -o a.npz", &["points.obj", "no triangle"]),
         ("voxelize index.obj -o a.npz", &["index.obj", "9"]),

@@ -25,16 +25,27 @@ pub enum GridError {
         dims: [u64; 3],
     },
     /// A voxel size is not a positive finite number.
-    #[error("voxel size {} x {} x {} must be positive and finite", voxel_size[0], voxel_size[1], voxel_size[2])]
+    #[error("voxel size {:?} x {:?} x {:?} must be positive, finite and not denormal", voxel_size[0], voxel_size[1], voxel_size[2])]
     VoxelSize {
         /// The size asked for.
         voxel_size: [f64; 3],
     },
     /// The origin, or the far corner, is not finite.
-    #[error("grid origin ({}, {}, {}) must be finite, and so must the far corner", origin[0], origin[1], origin[2])]
+    #[error("grid origin ({:?}, {:?}, {:?}) must be finite, and so must the far corner", origin[0], origin[1], origin[2])]
     Origin {
         /// The origin asked for.
         origin: [f64; 3],
+    },
+    /// A grid was to be fitted to a box so large or small that f64 cannot express the voxels.
+    #[error(
+        "the mesh is {extent:?} long, which f64 cannot divide into {resolution} voxels; \
+         scale the mesh, or remove stray vertices"
+    )]
+    Extent {
+        /// The longest side.
+        extent: f64,
+        /// The resolution asked for.
+        resolution: u32,
     },
     /// A grid was to be fitted to a box without extent.
     #[error("the mesh is a single point, so a resolution does not define a voxel size: give a voxel size instead")]
@@ -84,6 +95,9 @@ impl Grid {
             return Err(GridError::Dims { dims: [u64::from(resolution); 3] });
         }
         let voxel_size = [longest / f64::from(resolution); 3];
+        if !voxel_size[0].is_normal() {
+            return Err(GridError::Extent { extent: longest, resolution });
+        }
         let mut grid = Self::cover(bounds, voxel_size)?;
         for axis in 0..3 {
             // `longest / (longest / n)` may round to either side of n.
