@@ -126,7 +126,7 @@ pub(crate) struct GridArgs {
     pub(crate) dims: Option<Vec<u32>>,
 
     /// Minimum corner of the grid; by default that of the mesh's bounding box.
-    #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, allow_negative_numbers = true, conflicts_with = "like")]
+    #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, allow_hyphen_values = true, conflicts_with = "like")]
     pub(crate) origin: Option<Vec<f64>>,
 
     /// The grid of an existing volume (.npz, .npy, .binvox, .vti, .nrrd, .raw).

@@ -153,6 +153,11 @@ fn grids_are_made_in_every_way() {
         dims("t.obj --voxel-size 1 --origin -2 -1 0"),
         (j!([6, 5, 4]), j!([1.0, 1.0, 1.0]), j!([-2.0, -1.0, 0.0]))
     );
+    // Scientific notation is a negative number too.
+    assert_eq!(
+        dims("t.obj --voxel-size 1 --dims 2 2 2 --origin -5e-1 -2.5E-1 0"),
+        (j!([2, 2, 2]), j!([1.0, 1.0, 1.0]), j!([-0.5, -0.25, 0.0]))
+    );
     assert_eq!(dims("t.obj --dims 8 16 4"), (j!([8, 16, 4]), j!([1.0, 1.0, 1.0]), j!([0.0, 0.0, 0.0])));
     assert_eq!(
         dims("t.obj --dims 3 4 5 --origin 0.5 0.5 0.5 --voxel-size 0.25"),
