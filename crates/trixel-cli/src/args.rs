@@ -110,7 +110,8 @@ pub(crate) struct VoxelizeArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Grid")]
 pub(crate) struct GridArgs {
-    /// Exactly N cubic voxels along the mesh's longest side, as few as cover it along the others.
+    /// Exactly N cubic voxels along the mesh's longest side, as few as cover it along the others; 128 when no grid
+    /// option is given.
     #[arg(short, long, value_name = "N", conflicts_with_all = ["voxel_size", "dims", "origin", "like"],
         value_parser = clap::value_parser!(u32).range(1..=i64::from(Grid::MAX_DIM)))]
     pub(crate) resolution: Option<u32>,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, anyhow, ensure};
 use trixel::{Grid, UpAxis, Volume};
 use trixel_io::VolumeFormat;
 use trixel_io::atomic_file::{AtomicFile, Staged};
@@ -28,7 +28,7 @@ pub(crate) fn check_extension(path: &Path) -> Result<()> {
 pub(crate) fn check_output(path: &Path, grid: &Grid) -> Result<()> {
     if is_picture(path) {
         // Dropped at once, which removes it.
-        AtomicFile::create(path).map(drop).with_context(|| cannot_write(path))
+        AtomicFile::create(path).map(drop).map_err(|error| cannot_write(path, &error))
     } else {
         Ok(check_target(path, grid)?)
     }
@@ -41,13 +41,14 @@ pub(crate) fn stage_output(path: &Path, volume: &Volume, options: &WriteOptions<
 
 fn stage_picture(path: &Path, volume: &Volume, up: UpAxis) -> Result<Staged> {
     let picture = render_preview(volume, &PreviewOptions { up, ..PreviewOptions::default() })?;
-    let mut file = AtomicFile::create(path).with_context(|| cannot_write(path))?;
-    picture.encode_png(&mut file).with_context(|| cannot_write(path))?;
-    file.stage().with_context(|| cannot_write(path))
+    let mut file = AtomicFile::create(path).map_err(|error| cannot_write(path, &error))?;
+    picture.encode_png(&mut file).map_err(|error| cannot_write(path, &error))?;
+    file.stage().map_err(|error| cannot_write(path, &error))
 }
 
-fn cannot_write(path: &Path) -> String {
-    format!("cannot write {}", path.display())
+/// An output that failed, with the reason in the message.
+pub(crate) fn cannot_write(path: &Path, error: &dyn std::fmt::Display) -> anyhow::Error {
+    anyhow!("cannot write {}: {error}", path.display())
 }
 
 /// The bounding box of the set voxels, as first and last index along each axis; `None` when none is set.

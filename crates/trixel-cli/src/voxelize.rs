@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use trixel::lattice::LatticeMesh;
 use trixel::{Backend, Bytes, CpuBackend, Job, Mode, Topology, Volume};
 use trixel_io::VolumeFormat;
@@ -31,6 +31,10 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     check_method(&args.method);
     args.outputs.iter().try_for_each(|output| volume::check_extension(output))?;
     check_paths(&input, &args.outputs, args.report.as_deref())?;
+    if let Some(report) = &args.report {
+        // Dropped at once, which removes it: a report that cannot be written is known before the work.
+        AtomicFile::create(report).map(drop).map_err(|error| volume::cannot_write(report, &error))?;
+    }
     set_threads(&args.method)?;
     let reporter = Reporter::new(args.quiet);
     let mut stages = Stages::default();
@@ -173,7 +177,8 @@ fn check_paths(input: &str, outputs: &[PathBuf], report: Option<&Path>) -> Resul
 pub(crate) fn set_threads(method: &MethodArgs) -> Result<()> {
     if let Some(threads) = method.threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
-        pool.build_global().with_context(|| format!("cannot start {threads} threads; ask for fewer"))?;
+        pool.build_global()
+            .map_err(|error| anyhow::anyhow!("cannot start {threads} threads: {error}; ask for fewer"))?;
     }
     Ok(())
 }
@@ -219,16 +224,18 @@ fn empty_hint(mode: Mode) -> String {
     match mode {
         Mode::Solid => "no voxel is set: no voxel's centre is inside the mesh, or the mesh lies outside the grid",
         Mode::Sliced => "no voxel is set: no line through voxel centres along z meets the mesh inside the grid",
-        Mode::Conservative | Mode::Thin => "no voxel is set: the mesh lies outside the grid",
+        Mode::Thin => {
+            "no voxel is set: the mesh lies outside the grid, or is so small that it passes no voxel's centre closely"
+        }
+        Mode::Conservative => "no voxel is set: the mesh lies outside the grid",
     }
     .to_owned()
 }
 
 fn stage_report(path: &Path, report: &Report) -> Result<Staged> {
-    let cannot = || format!("cannot write {}", path.display());
-    let mut file = AtomicFile::create(path).with_context(cannot)?;
-    serde_json::to_writer_pretty(&mut file, report).with_context(cannot)?;
-    file.stage().with_context(cannot)
+    let mut file = AtomicFile::create(path).map_err(|error| volume::cannot_write(path, &error))?;
+    serde_json::to_writer_pretty(&mut file, report).map_err(|error| volume::cannot_write(path, &error))?;
+    file.stage().map_err(|error| volume::cannot_write(path, &error))
 }
 
 /// Bytes of a volume, for messages.

@@ -246,6 +246,7 @@ fn failures_exit_with_1_and_say_what_to_do() {
     bench.write("denormal.obj", "v 0 0 0\nv 1e-320 0 0\nv 0 1e-320 0\nf 1 2 3\n");
     bench.write("what.xyz", "1 2 3\n");
     bench.write("broken.npz", "PK");
+    std::fs::create_dir(bench.path("folder.png")).unwrap();
     for (arguments, words) in [
         ("voxelize none.obj -o a.npz", &["none.obj", "No such file"][..]),
         ("voxelize what.xyz -o a.npz", &["what.xyz", ".obj"]),
@@ -265,6 +266,11 @@ fn failures_exit_with_1_and_say_what_to_do() {
         ("voxelize t.obj -o a.npz -o none/b.npz", &["none"]),
         ("voxelize t.obj -o a.npz -o none/b.png", &["none"]),
         ("voxelize t.obj -o a.npz --report none/r.json", &["none"]),
+        ("voxelize t.obj -o a.npz -o none/b.png", &["no folder none; create it"]),
+        ("voxelize t.obj -o a.npz --report none/r.json", &["no folder none; create it"]),
+        ("voxelize t.obj -o a.npz -o folder.png", &["folder.png", "names a folder"]),
+        ("voxelize t.obj -o a.npz --report folder.png", &["folder.png", "names a folder"]),
+        ("voxelize t.obj -o a.npz -o b.npz/", &["b.npz/", "folder"]),
         ("voxelize t.obj -o t.obj", &["t.obj", "input"]),
         ("voxelize t.obj -o a.npz -o a.vox -r 3000", &["a.vox", "2000"]),
         ("voxelize t.obj -o a.binvox --voxel-size 1 2 3", &["a.binvox"]),

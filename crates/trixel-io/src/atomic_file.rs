@@ -54,12 +54,22 @@ impl AtomicFile {
     /// Opens a temporary file in the folder of `target`.
     ///
     /// # Errors
-    /// When the folder is missing or cannot be written.
+    /// When the target is a folder, or its own folder is missing or cannot be written.
     pub fn create(target: &Path) -> io::Result<Self> {
         /// Tells apart the files of one process.
         static COUNTER: AtomicU64 = AtomicU64::new(0);
         let name =
             target.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"))?;
+        // Here, so that no output finds out only when others already have their names.
+        let ends_in_separator =
+            target.as_os_str().as_encoded_bytes().last().is_some_and(|&b| std::path::is_separator(char::from(b)));
+        if ends_in_separator || target.is_dir() {
+            return Err(io::Error::new(io::ErrorKind::IsADirectory, "the path names a folder; choose another name"));
+        }
+        if let Some(folder) = target.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
+            let what = format!("there is no folder {}; create it first", folder.display());
+            return Err(io::Error::new(io::ErrorKind::NotFound, what));
+        }
         loop {
             let mut temporary = OsString::from(".");
             temporary.push(name);
