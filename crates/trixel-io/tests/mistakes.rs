@@ -156,3 +156,14 @@ fn a_folder_that_may_not_be_written() {
         assert_says(folder.path(), &write(&path, grid), "cannot write DIR/a.npz: Permission denied");
     }
 }
+
+/// A device that never ends is refused after a bounded read instead of filling the memory.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_endless_device_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("zero.stl");
+    std::os::unix::fs::symlink("/dev/zero", &path).unwrap();
+    let error = trixel_io::read::read_mesh(&path, &trixel_io::read::ReadOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("not a regular file") && error.contains("save it"), "{error}");
+}

@@ -237,11 +237,18 @@ pub fn read_mesh(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError
 }
 
 fn load(path: &Path) -> std::io::Result<Vec<u8>> {
-    let (mut file, length) = open(path)?;
+    /// The most that is read from what has no length: a pipe, or a device, which may never end.
+    const ENDLESS: u64 = 1 << 30;
+    let (file, length) = open(path)?;
     // The length is a hint only, and may not even fit the memory.
     let mut bytes = Vec::new();
     bytes.try_reserve_exact(usize::try_from(length).unwrap_or(usize::MAX))?;
-    file.read_to_end(&mut bytes)?;
+    let limit = if file.metadata()?.is_file() { u64::MAX } else { ENDLESS };
+    file.take(limit).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 == limit {
+        let what = "not a regular file, and it gives more than 1 GiB; save it to a file first";
+        return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, what));
+    }
     Ok(bytes)
 }
 
