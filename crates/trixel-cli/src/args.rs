@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::builder::styling::{AnsiColor, Styles};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use trixel::{Grid, Job, Mode, Strategy, UpAxis};
+use trixel_gpu::{Dilation, Heuristic};
 
 const STYLES: Styles = Styles::styled()
     .header(AnsiColor::Yellow.on_default().bold())
@@ -35,6 +36,11 @@ pub(crate) enum Command {
     ///
     /// Exits with status 1 if any voxel differs.
     Verify(VerifyArgs),
+    /// Find the cutoff at which the hybrid strategy is fastest on this machine's GPU, and store it for later runs.
+    ///
+    /// Searches by golden section on the mesh and grid given, prints what it measured beside the two pure strategies, and
+    /// keeps the best cutoff in the user's configuration folder.
+    Tune(TuneArgs),
     /// Print a completion script for a shell.
     ///
     /// For example: trixel completions bash > ~/.local/share/bash-completion/completions/trixel
@@ -156,9 +162,93 @@ pub(crate) struct MethodArgs {
     #[arg(long, value_enum, default_value_t)]
     pub(crate) strategy: StrategyArg,
 
+    #[command(flatten)]
+    pub(crate) gpu: GpuArgs,
+
     /// Number of threads; the result is the same for any. By default one a core.
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub(crate) threads: Option<u32>,
+}
+
+/// What only the GPU backend looks at.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "GPU")]
+pub(crate) struct GpuArgs {
+    /// Compute on the adapter whose name or driver contains NAME, in any case; `trixel info --adapters` lists them.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) adapter: Option<String>,
+
+    /// The hybrids leave triangles of this size and above to the rasterizer, in voxels squared of --heuristic; 0 leaves it
+    /// all of them, inf none. By default what `trixel tune` stored, or a value for the kind of adapter.
+    #[arg(long, value_name = "SIZE", value_parser = parse_cutoff, allow_negative_numbers = true)]
+    pub(crate) cutoff: Option<f32>,
+
+    /// What a triangle's size is.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) heuristic: HeuristicArg,
+
+    /// How triangles are enlarged for the rasterizer.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) dilation: DilationArg,
+
+    /// Count invocations, fragments, tests, writes and atomics for the report. Costs time.
+    #[arg(long)]
+    pub(crate) counters: bool,
+}
+
+fn parse_cutoff(text: &str) -> Result<f32, String> {
+    let size: f32 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if size >= 0.0 { Ok(size) } else { Err("a cutoff takes 0 or more, or inf".to_owned()) }
+}
+
+/// [`Heuristic`] on the command line.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(crate) enum HeuristicArg {
+    /// The area projected along the dominant axis.
+    #[default]
+    ProjectedArea,
+    /// The area of the projection's bounding rectangle.
+    BoxArea,
+    /// The area of the projection, enlarged by half a voxel.
+    DilatedArea,
+    /// The projected area over the dilated one, 0 to 1.
+    AreaRatio,
+    /// The voxels of the bounding box.
+    Extent,
+}
+
+impl From<HeuristicArg> for Heuristic {
+    fn from(heuristic: HeuristicArg) -> Self {
+        match heuristic {
+            HeuristicArg::ProjectedArea => Self::ProjectedArea,
+            HeuristicArg::BoxArea => Self::BoxArea,
+            HeuristicArg::DilatedArea => Self::DilatedArea,
+            HeuristicArg::AreaRatio => Self::AreaRatio,
+            HeuristicArg::Extent => Self::Extent,
+        }
+    }
+}
+
+/// [`Dilation`] on the command line.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(crate) enum DilationArg {
+    /// The convex hull of pixel-sized squares at the corners.
+    HasselgrenHull,
+    /// Edges moved out by half a pixel's reach.
+    #[default]
+    HasselgrenTriangle,
+    /// Edges moved out by half a pixel's diagonal.
+    Hertel,
+}
+
+impl From<DilationArg> for Dilation {
+    fn from(dilation: DilationArg) -> Self {
+        match dilation {
+            DilationArg::HasselgrenHull => Self::HasselgrenHull,
+            DilationArg::HasselgrenTriangle => Self::HasselgrenTriangle,
+            DilationArg::Hertel => Self::Hertel,
+        }
+    }
 }
 
 fn parse_overlap(text: &str) -> Result<f64, String> {
@@ -173,12 +263,50 @@ fn parse_overlap(text: &str) -> Result<f64, String> {
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
     /// A mesh file, a volume (.npz, .npy, .binvox, .vti, .nrrd, .raw), or scene:NAME or scene:NAME:N.
-    #[arg(value_name = "FILE")]
-    pub(crate) file: String,
+    #[arg(value_name = "FILE", required_unless_present = "adapters")]
+    pub(crate) file: Option<String>,
+
+    /// List the GPU adapters of this machine instead.
+    #[arg(long, conflicts_with = "file")]
+    pub(crate) adapters: bool,
 
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TuneArgs {
+    /// A mesh file, or scene:NAME or scene:NAME:N.
+    #[arg(value_name = "INPUT")]
+    pub(crate) input: Option<String>,
+
+    #[command(flatten)]
+    pub(crate) grid: GridArgs,
+
+    /// Which voxels are set.
+    #[arg(short, long, value_enum, default_value_t)]
+    pub(crate) mode: ModeArg,
+
+    /// Tune for the adapter whose name or driver contains NAME; by default the first, real ones before software.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) adapter: Option<String>,
+
+    /// What a triangle's size is.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) heuristic: HeuristicArg,
+
+    /// How triangles are enlarged for the rasterizer.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) dilation: DilationArg,
+
+    /// Runs per cutoff; their median counts.
+    #[arg(long, value_name = "N", default_value = "5")]
+    pub(crate) repeat: NonZeroU32,
+
+    /// Print the curve, but store nothing.
+    #[arg(long)]
+    pub(crate) dry_run: bool,
 }
 
 #[derive(Debug, Args)]
@@ -227,11 +355,13 @@ impl From<ModeArg> for Mode {
 /// The backends of this build.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(crate) enum BackendArg {
-    /// The best there is.
+    /// A real GPU if there is one, else the processor.
     #[default]
     Auto,
     /// The processor.
     Cpu,
+    /// A GPU, through Vulkan, Metal or Direct3D 12; a software one if there is no other.
+    Gpu,
 }
 
 /// [`Strategy`] on the command line.
@@ -242,6 +372,16 @@ pub(crate) enum StrategyArg {
     Auto,
     /// CPU: one run of voxels per triangle and grid column.
     ColumnRuns,
+    /// GPU: one invocation a triangle.
+    TriangleParallel,
+    /// GPU: one fragment a column of a triangle.
+    FragmentParallel,
+    /// GPU: small triangles by invocation, large ones by the rasterizer, in one go.
+    Hybrid,
+    /// GPU: the same, with the triangles sorted first.
+    HybridTwoPass,
+    /// GPU: one invocation a pair of triangle and column.
+    Balanced,
 }
 
 impl From<StrategyArg> for Strategy {
@@ -249,6 +389,11 @@ impl From<StrategyArg> for Strategy {
         match strategy {
             StrategyArg::Auto => Self::Auto,
             StrategyArg::ColumnRuns => Self::ColumnRuns,
+            StrategyArg::TriangleParallel => Self::TriangleParallel,
+            StrategyArg::FragmentParallel => Self::FragmentParallel,
+            StrategyArg::Hybrid => Self::Hybrid,
+            StrategyArg::HybridTwoPass => Self::HybridTwoPass,
+            StrategyArg::Balanced => Self::Balanced,
         }
     }
 }

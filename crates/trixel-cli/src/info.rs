@@ -7,25 +7,37 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use trixel::{Mesh, Topology};
+use trixel_gpu::GpuError;
 use trixel_io::VolumeFormat;
 use trixel_io::volume_read::read_volume;
 
 use crate::args::InfoArgs;
 use crate::progress::Reporter;
-use crate::report::{GridReport, MeshReport};
+use crate::report::{AdapterReport, GridReport, MeshReport};
 use crate::voxelize::volume_bytes;
 use crate::{memory, mesh, volume};
 
 pub(crate) fn run(args: &InfoArgs) -> Result<ExitCode> {
     let reporter = Reporter::new(false);
-    let path = Path::new(&args.file);
-    let readable = VolumeFormat::from_path(path).is_some_and(VolumeFormat::is_readable);
-    let (text, json) = if readable && !args.file.starts_with("scene:") {
-        let info = volume_info(path, &reporter)?;
-        (info.text(), serde_json::to_string_pretty(&info)?)
-    } else {
-        let info = mesh_info(&args.file, &reporter)?;
-        (info.text(), serde_json::to_string_pretty(&info)?)
+    let (text, json) = match &args.file {
+        Some(file) => {
+            let path = Path::new(file);
+            let readable = VolumeFormat::from_path(path).is_some_and(VolumeFormat::is_readable);
+            if readable && !file.starts_with("scene:") {
+                let info = volume_info(path, &reporter)?;
+                (info.text(), serde_json::to_string_pretty(&info)?)
+            } else {
+                let info = mesh_info(file, &reporter)?;
+                (info.text(), serde_json::to_string_pretty(&info)?)
+            }
+        }
+        None => {
+            let (adapters, _) = reporter.stage("looking for adapters", trixel_gpu::adapters);
+            let text = adapters.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+            let text = if adapters.is_empty() { GpuError::NoAdapter.to_string() } else { text };
+            let adapters: Vec<_> = adapters.iter().map(AdapterReport::from).collect();
+            (text, serde_json::to_string_pretty(&adapters)?)
+        }
     };
     reporter.finish();
     let mut out = std::io::stdout().lock();

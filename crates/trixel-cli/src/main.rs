@@ -1,12 +1,15 @@
 //! The `trixel` command.
 
 mod args;
+mod engine;
 mod grid;
 mod info;
 mod memory;
 mod mesh;
 mod progress;
 mod report;
+mod tune;
+mod tuned;
 mod verify;
 mod volume;
 mod voxelize;
@@ -23,6 +26,7 @@ fn main() -> ExitCode {
         Command::Voxelize(args) => voxelize::run(*args),
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Tune(args) => tune::run(args),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "trixel", &mut std::io::stdout());
             Ok(ExitCode::SUCCESS)

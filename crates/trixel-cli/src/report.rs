@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use trixel::{Grid, Mesh, Topology};
+use trixel_gpu::{AdapterInfo, Counters, Cutoff};
 
 /// What `--report` writes.
 #[derive(Debug, Serialize)]
@@ -16,12 +17,17 @@ pub(crate) struct Report {
     pub(crate) strategy: &'static str,
     pub(crate) threads: usize,
     /// The GPU adapter; null on the CPU.
-    pub(crate) adapter: Option<serde_json::Value>,
+    pub(crate) adapter: Option<AdapterReport>,
     /// How many voxels are set.
     pub(crate) voxels: u64,
     pub(crate) stages_ms: Stages,
     pub(crate) samples_ms: Samples,
-    pub(crate) counters: Option<serde_json::Value>,
+    /// What the shaders counted, if asked to.
+    pub(crate) counters: Option<CountersReport>,
+    /// The hybrids' cutoff.
+    pub(crate) cutoff: Option<CutoffReport>,
+    /// Milliseconds of each pass of the last run on the device, where it has timestamps.
+    pub(crate) passes_ms: Vec<(&'static str, f64)>,
     pub(crate) peak_memory_bytes: Option<u64>,
     pub(crate) outputs: Vec<String>,
     pub(crate) warnings: Vec<String>,
@@ -59,6 +65,59 @@ impl MeshReport {
     }
 }
 
+/// A GPU adapter, in a report and in `info --adapters --json`.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct AdapterReport {
+    pub(crate) name: String,
+    pub(crate) driver: String,
+    pub(crate) backend: String,
+    pub(crate) software: bool,
+}
+
+impl From<&AdapterInfo> for AdapterReport {
+    fn from(info: &AdapterInfo) -> Self {
+        Self {
+            name: info.name.clone(),
+            driver: info.driver.clone(),
+            backend: info.backend.clone(),
+            software: info.software,
+        }
+    }
+}
+
+/// [`Counters`] in a report.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct CountersReport {
+    invocations: u64,
+    fragments: u64,
+    fragments_discarded: u64,
+    columns: u64,
+    voxel_tests: u64,
+    voxels_written: u64,
+    atomics: u64,
+}
+
+impl From<Counters> for CountersReport {
+    fn from(counters: Counters) -> Self {
+        let Counters { invocations, fragments, fragments_discarded, columns, voxel_tests, voxels_written, atomics } =
+            counters;
+        Self { invocations, fragments, fragments_discarded, columns, voxel_tests, voxels_written, atomics }
+    }
+}
+
+/// [`Cutoff`] in a report.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct CutoffReport {
+    heuristic: &'static str,
+    value: f32,
+}
+
+impl From<Cutoff> for CutoffReport {
+    fn from(cutoff: Cutoff) -> Self {
+        Self { heuristic: cutoff.heuristic.name(), value: cutoff.value }
+    }
+}
+
 /// A grid, as every report and sidecar names it.
 #[derive(Debug, Serialize)]
 pub(crate) struct GridReport {
@@ -82,7 +141,14 @@ pub(crate) struct Stages {
     pub(crate) topology: Option<f64>,
     pub(crate) snap: f64,
     pub(crate) allocate: f64,
+    /// Opening the GPU and checking it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) open: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) upload: Option<f64>,
     pub(crate) voxelize: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) download: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) write: Option<f64>,
     pub(crate) total: f64,

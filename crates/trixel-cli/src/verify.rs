@@ -5,12 +5,13 @@ use std::process::ExitCode;
 
 use anyhow::{Result, ensure};
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, Mode, Topology, Volume};
+use trixel::{Mode, Topology, Volume};
 use trixel_io::volume_read::read_volume;
 
 use crate::args::VerifyArgs;
 use crate::progress::Reporter;
-use crate::voxelize::{allocate, backend, check_method, job, set_threads, warn_if_open};
+use crate::engine::Engine;
+use crate::voxelize::{ContextOf, allocate, check_method, job, set_threads, warn_if_open};
 use crate::{memory, mesh};
 
 pub(crate) fn run(args: &VerifyArgs) -> Result<ExitCode> {
@@ -28,9 +29,9 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<ExitCode> {
         warn_if_open(Some(&Topology::of(&mesh)), &reporter);
     }
     let (expected, _) = reporter.stage("voxelizing", || -> Result<Volume> {
-        let lattice = LatticeMesh::snap(&mesh, job.grid())?;
+        let lattice = LatticeMesh::snap(&mesh, job.grid()).with_context_of(&args.mesh)?;
         let mut volume = allocate(&job)?;
-        backend(args.method.backend).voxelize(&lattice, &job, &mut volume)?;
+        Engine::open(&args.method, &reporter)?.run(&lattice, &job, &mut volume, 1, &reporter)?;
         Ok(volume)
     });
     let expected = expected?;

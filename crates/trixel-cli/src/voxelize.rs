@@ -7,12 +7,13 @@ use std::time::Instant;
 
 use anyhow::{Result, bail};
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, Bytes, CpuBackend, Job, Mode, Topology, Volume};
+use trixel::{Bytes, Job, Mode, Topology, Volume};
 use trixel_io::VolumeFormat;
 use trixel_io::atomic_file::{AtomicFile, Staged};
 use trixel_io::write::WriteOptions;
 
-use crate::args::{BackendArg, MethodArgs, VoxelizeArgs};
+use crate::args::{MethodArgs, VoxelizeArgs};
+use crate::engine::Engine;
 use crate::grid::{GridRequest, usage};
 use crate::progress::Reporter;
 use crate::report::{GridReport, MeshReport, Report, Samples, Stages, median};
@@ -66,14 +67,12 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let mut voxels = voxels?;
     stages.allocate = allocate_ms;
 
-    let backend = backend(args.method.backend);
-    let mut samples = Samples::default();
-    let mut strategy = job.strategy();
-    for _ in 0..args.repeat.get() {
-        let (used, ms) = reporter.stage("voxelizing", || backend.voxelize(&lattice, &job, &mut voxels));
-        strategy = used?;
-        samples.voxelize.push(ms);
-    }
+    let (engine, open_ms) = reporter.stage("choosing a backend", || Engine::open(&args.method, &reporter));
+    let ran = engine?.run(&lattice, &job, &mut voxels, args.repeat.get(), &reporter)?;
+    stages.open = ran.adapter.is_some().then_some(open_ms);
+    stages.upload = ran.upload_ms;
+    stages.download = ran.download_ms;
+    let samples = Samples { voxelize: ran.samples_ms };
     stages.voxelize = median(&samples.voxelize);
     drop(lattice);
     let mesh_report = topology.map(|topology| MeshReport::new(&loaded, &topology));
@@ -108,14 +107,16 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
             grid: GridReport::from(job.grid()),
             mode: job.mode().name(),
             overlap: args.method.overlap,
-            backend: backend.name(),
-            strategy: strategy.name(),
-            threads: backend.threads(),
-            adapter: None,
+            backend: ran.backend,
+            strategy: ran.strategy.name(),
+            threads: rayon::current_num_threads(),
+            adapter: ran.adapter,
             voxels: count,
             stages_ms: stages,
             samples_ms: samples,
-            counters: None,
+            counters: ran.counters,
+            cutoff: ran.cutoff,
+            passes_ms: ran.passes_ms,
             peak_memory_bytes: memory::peak(),
             outputs: args.outputs.iter().map(|path| path.display().to_string()).collect(),
             warnings: reporter.warnings(),
@@ -138,7 +139,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
 }
 
 /// Names the input in errors about its vertices.
-trait ContextOf<T> {
+pub(crate) trait ContextOf<T> {
     fn with_context_of(self, input: &str) -> Result<T>;
 }
 
@@ -188,19 +189,13 @@ pub(crate) fn check_method(method: &MethodArgs) {
     if method.overlap != 0.0 && Mode::from(method.mode) != Mode::Sliced {
         usage("--overlap only means something with --mode sliced");
     }
+    Engine::check(method);
 }
 
 /// The job that the arguments describe.
 pub(crate) fn job(method: &MethodArgs, grid: trixel::Grid) -> Result<Job> {
     let job = Job::new(grid, method.mode.into()).with_strategy(method.strategy.into());
     Ok(job.with_overlap(method.overlap)?)
-}
-
-/// The backend that the arguments ask for.
-pub(crate) fn backend(backend: BackendArg) -> CpuBackend {
-    match backend {
-        BackendArg::Auto | BackendArg::Cpu => CpuBackend::default(),
-    }
 }
 
 /// An empty volume, if there is memory for it.

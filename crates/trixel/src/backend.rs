@@ -55,6 +55,14 @@ pub enum Error {
     /// The volume to write into has another grid than the job.
     #[error("the volume's grid is not the job's; make the volume with `Volume::new(*job.grid())`")]
     GridMismatch,
+    /// The device failed; what it computed is lost.
+    #[error("{backend}: {reason}")]
+    Device {
+        /// The device's name.
+        backend: String,
+        /// What happened and what to do.
+        reason: String,
+    },
 }
 
 fn list(strategies: &[Strategy]) -> String {

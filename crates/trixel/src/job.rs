@@ -28,11 +28,30 @@ pub enum Strategy {
     Auto,
     /// The CPU's: every triangle becomes one run of voxels per grid column that it meets.
     ColumnRuns,
+    /// GPU: one invocation a triangle (\[HCV\] 3.1).
+    TriangleParallel,
+    /// GPU: one fragment a column of a triangle, made by the rasterizer (\[HCV\] 3.2).
+    FragmentParallel,
+    /// GPU: small triangles as in [`Self::TriangleParallel`], large ones left to [`Self::FragmentParallel`] within the
+    /// same submission (\[HCV\] 3.3, figure 3.12).
+    Hybrid,
+    /// GPU: the triangles are sorted into small and large first (\[HCV\] figure 3.11).
+    HybridTwoPass,
+    /// GPU: one invocation a pair of triangle and column (\[HCV\] chapter 5).
+    Balanced,
 }
 
 impl Strategy {
     /// Every strategy.
-    pub const ALL: [Self; 2] = [Self::Auto, Self::ColumnRuns];
+    pub const ALL: [Self; 7] = [
+        Self::Auto,
+        Self::ColumnRuns,
+        Self::TriangleParallel,
+        Self::FragmentParallel,
+        Self::Hybrid,
+        Self::HybridTwoPass,
+        Self::Balanced,
+    ];
 
     /// The name on the command line and in reports.
     #[must_use]
@@ -40,6 +59,11 @@ impl Strategy {
         match self {
             Self::Auto => "auto",
             Self::ColumnRuns => "column-runs",
+            Self::TriangleParallel => "triangle-parallel",
+            Self::FragmentParallel => "fragment-parallel",
+            Self::Hybrid => "hybrid",
+            Self::HybridTwoPass => "hybrid-two-pass",
+            Self::Balanced => "balanced",
         }
     }
 }

@@ -18,8 +18,23 @@ macro_rules! conformance_suite {
     ($name:ident, $backend:expr) => {
         $crate::conformance_suite!(@tests $name, $backend,
             zoo_conservative zoo_thin zoo_solid zoo_sliced
-            random_small random_on_lattice random_degenerate random_large random_far_outside
+            random_small random_on_lattice random_degenerate random_large random_huge random_far_outside
+            random_in_cells
             sliced_overlap solid_closed_soup huge_dims
+            grid_is_overwritten other_grid_is_refused
+            rival_cuda_voxelizer_64_aligned_cube rival_fluidx3d_323_lattice_terrain rival_open3d_6111_interior
+            rival_voxsurf_10_cube rival_cinolib_189_faces_on_planes rival_cuda_voxelizer_10_beyond_1024
+            rival_trimesh_subdivision_misses rival_cuda_voxelizer_59_unequal_dims rival_openvdb_151_anisotropic
+            rival_openvdb_111_nested_shells
+        );
+    };
+    // For a backend to which every single voxelization is dear: random triangles by the thousand in one grid instead of
+    // one by one.
+    (batched $name:ident, $backend:expr) => {
+        $crate::conformance_suite!(@tests $name, $backend,
+            zoo_conservative zoo_thin zoo_solid zoo_sliced
+            random_huge random_in_cells
+            solid_closed_soup huge_dims
             grid_is_overwritten other_grid_is_refused
             rival_cuda_voxelizer_64_aligned_cube rival_fluidx3d_323_lattice_terrain rival_open3d_6111_interior
             rival_voxsurf_10_cube rival_cinolib_189_faces_on_planes rival_cuda_voxelizer_10_beyond_1024

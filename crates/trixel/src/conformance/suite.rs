@@ -153,6 +153,41 @@ pub fn random_large(backend: &dyn Backend) {
     random(backend, 4, 12, &Placement::ALL, [24, 20, 28], &[60, 64, 66, 300, 5000, 1_000_000]);
 }
 
+/// Few triangles, up to the size where 32-bit halves stop sufficing.
+pub fn random_huge(backend: &dyn Backend) {
+    random(backend, 9, 2, &Placement::ALL, [24, 20, 28], &[300, 5000, 8191, 10_000]);
+}
+
+/// Thousands of triangles, each alone in a cell of one grid, so that none hides behind another; the outermost cells are
+/// cut by the grid's border.
+pub fn random_in_cells(backend: &dyn Backend) {
+    let mut random = Random::new(7);
+    for (extent, along) in [(1, 12), (2, 12), (4, 10), (9, 8), (70, 3), (150, 2)] {
+        for placement in Placement::ALL {
+            // Room for a triangle that starts anywhere in the middle voxel, and for half a slice of overlap.
+            let pitch = 2 * extent + 5;
+            let triangles: Vec<_> = (0..along * along * along)
+                .map(|cell| {
+                    let at = [cell / along / along, cell / along % along, cell % along].map(|c| (c * pitch) << 16);
+                    let corners = random::triangle(&mut random, placement, 0, 1, extent);
+                    corners.map(|corner| std::array::from_fn(|axis| corner[axis] + at[axis]))
+                })
+                .collect();
+            let side = u32::try_from((along - 1) * pitch + extent / 2).unwrap_or(1);
+            let cells = grid([1.0; 3], [1.0; 3], [side, side + 3, side - 1]);
+            let mesh = lattice_mesh(&triangles);
+            for mode in Mode::ALL {
+                let job = Job::new(cells, mode);
+                let job = if mode == Mode::Sliced { job.with_overlap(0.5) } else { Ok(job) };
+                match job {
+                    Ok(job) => compare(backend, &format!("{placement:?}, up to {extent} voxels"), &mesh, &job),
+                    Err(error) => panic!("{error}"),
+                }
+            }
+        }
+    }
+}
+
 /// Triangles mostly outside the grid.
 pub fn random_far_outside(backend: &dyn Backend) {
     let mut random = Random::new(5);

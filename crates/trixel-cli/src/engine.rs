@@ -1,0 +1,191 @@
+//! Who computes: the CPU, or a GPU with its own steps.
+
+use std::time::Instant;
+
+use anyhow::Result;
+use trixel::lattice::LatticeMesh;
+use trixel::{Backend, CpuBackend, Job, Strategy, Volume};
+use trixel_gpu::{AdapterChoice, Cutoff, Gpu, GpuError, GpuMesh, GpuVolume, Options, STRATEGIES, Voxelizer};
+
+use crate::args::{BackendArg, MethodArgs};
+use crate::grid::usage;
+use crate::progress::Reporter;
+use crate::report::{AdapterReport, CountersReport, CutoffReport};
+use crate::tuned;
+
+/// An open backend.
+pub(crate) enum Engine {
+    Cpu,
+    Gpu {
+        gpu: Box<Gpu>,
+        options: Options,
+        /// Whether the CPU takes over, with a warning, when the GPU fails.
+        cpu_may_help: bool,
+    },
+}
+
+/// What a run did.
+pub(crate) struct Ran {
+    pub(crate) backend: &'static str,
+    pub(crate) strategy: Strategy,
+    pub(crate) adapter: Option<AdapterReport>,
+    pub(crate) counters: Option<CountersReport>,
+    pub(crate) cutoff: Option<CutoffReport>,
+    pub(crate) passes_ms: Vec<(&'static str, f64)>,
+    pub(crate) upload_ms: Option<f64>,
+    pub(crate) samples_ms: Vec<f64>,
+    pub(crate) download_ms: Option<f64>,
+}
+
+/// Whether the arguments can only mean a GPU.
+fn wants_gpu(method: &MethodArgs) -> bool {
+    matches!(method.backend, BackendArg::Gpu) || method.gpu.adapter.is_some()
+}
+
+impl Engine {
+    /// Refuses arguments that contradict each other, before anything is read.
+    pub(crate) fn check(method: &MethodArgs) {
+        let strategy = Strategy::from(method.strategy);
+        let of_gpu = STRATEGIES.contains(&strategy);
+        if matches!(method.backend, BackendArg::Cpu) {
+            if method.gpu.adapter.is_some() {
+                usage("--adapter names a GPU, but --backend cpu asks for the processor; leave one of them out");
+            }
+            if of_gpu {
+                usage(&format!("--strategy {strategy} is one of the GPU's; use --backend gpu"));
+            }
+        }
+        if wants_gpu(method) && strategy == Strategy::ColumnRuns {
+            usage("--strategy column-runs is the processor's; leave it out, or use --backend cpu");
+        }
+    }
+
+    /// Opens what the arguments ask for.
+    pub(crate) fn open(method: &MethodArgs, reporter: &Reporter) -> Result<Self> {
+        let strategy = Strategy::from(method.strategy);
+        let asked = wants_gpu(method);
+        let of_gpu = STRATEGIES.contains(&strategy);
+        let cpu = matches!(method.backend, BackendArg::Cpu) || strategy == Strategy::ColumnRuns;
+        if cpu || !asked && !of_gpu && !trixel_gpu::hardware_is_possible() {
+            return Ok(Self::Cpu);
+        }
+        let choice = match &method.gpu.adapter {
+            Some(name) => AdapterChoice::Named(name.clone()),
+            None if asked => AdapterChoice::Any,
+            None => AdapterChoice::Hardware,
+        };
+        let gpu = match Gpu::open(&choice) {
+            Ok(gpu) => gpu,
+            Err(GpuError::NoAdapter | GpuError::OnlySoftware(_)) if !asked && !of_gpu => return Ok(Self::Cpu),
+            Err(error @ GpuError::OnlySoftware(_)) if !asked => {
+                anyhow::bail!("--strategy {strategy} needs a GPU: {error} (--backend gpu takes it)")
+            }
+            Err(error) if !asked && !of_gpu => {
+                reporter.warn(format!("{error}; the processor computes instead"));
+                return Ok(Self::Cpu);
+            }
+            Err(error) => return Err(error.into()),
+        };
+        let heuristic = method.gpu.heuristic.into();
+        let cutoff = method.gpu.cutoff.map(|value| Cutoff { heuristic, value });
+        let cutoff = cutoff
+            .or_else(|| tuned::load(gpu.info(), heuristic, reporter))
+            .unwrap_or_else(|| Cutoff::default_for(gpu.info(), heuristic));
+        let options = Options {
+            cutoff: Some(cutoff),
+            dilation: method.gpu.dilation.into(),
+            count: method.gpu.counters,
+        };
+        Ok(Self::Gpu { gpu: Box::new(gpu), options, cpu_may_help: !asked && !of_gpu })
+    }
+
+    /// Voxelizes `repeat` times.
+    pub(crate) fn run(
+        &self,
+        mesh: &LatticeMesh<'_>,
+        job: &Job,
+        volume: &mut Volume,
+        repeat: u32,
+        reporter: &Reporter,
+    ) -> Result<Ran> {
+        match self {
+            Self::Cpu => run_on_cpu(mesh, job, volume, repeat, reporter),
+            Self::Gpu { gpu, options, cpu_may_help } => {
+                match run_on_gpu(gpu, options, mesh, job, volume, repeat, reporter) {
+                    Err(error) if *cpu_may_help => {
+                        reporter.warn(format!("{error}; the processor computes instead"));
+                        run_on_cpu(mesh, job, volume, repeat, reporter)
+                    }
+                    ran => Ok(ran?),
+                }
+            }
+        }
+    }
+}
+
+fn run_on_cpu(
+    mesh: &LatticeMesh<'_>,
+    job: &Job,
+    volume: &mut Volume,
+    repeat: u32,
+    reporter: &Reporter,
+) -> Result<Ran> {
+    let backend = CpuBackend::default();
+    let mut samples_ms = vec![];
+    let mut strategy = job.strategy();
+    for _ in 0..repeat {
+        let (used, ms) = reporter.stage("voxelizing", || backend.voxelize(mesh, job, volume));
+        strategy = used?;
+        samples_ms.push(ms);
+    }
+    Ok(Ran {
+        backend: backend.name(),
+        strategy,
+        adapter: None,
+        counters: None,
+        cutoff: None,
+        passes_ms: vec![],
+        upload_ms: None,
+        samples_ms,
+        download_ms: None,
+    })
+}
+
+fn run_on_gpu(
+    gpu: &Gpu,
+    options: &Options,
+    mesh: &LatticeMesh<'_>,
+    job: &Job,
+    volume: &mut Volume,
+    repeat: u32,
+    reporter: &Reporter,
+) -> Result<Ran, GpuError> {
+    let (on_gpu, upload_ms) = reporter.stage("uploading", || GpuMesh::upload(gpu, mesh));
+    let on_gpu = on_gpu?;
+    let voxels = GpuVolume::new(gpu, *job.grid())?;
+    let mut voxelizer = Voxelizer::new(gpu, job, options)?;
+    voxelizer.prepare()?;
+    let mut samples_ms = vec![];
+    for _ in 0..repeat {
+        let (ran, ms) = reporter.stage("voxelizing", || voxelizer.run(&on_gpu, &voxels));
+        ran?;
+        samples_ms.push(ms);
+    }
+    let counters = if options.count { Some(voxelizer.check()?.into()) } else { None };
+    let passes_ms = voxelizer.pass_times()?.iter().map(|pass| (pass.name, pass.ms)).collect();
+    let start = Instant::now();
+    voxels.download(gpu, volume)?;
+    let strategy = voxelizer.strategy();
+    let hybrid = matches!(strategy, Strategy::Hybrid | Strategy::HybridTwoPass);
+    Ok(Ran {
+        backend: "gpu",
+        strategy,
+        adapter: Some(AdapterReport::from(gpu.info())),
+        counters,
+        cutoff: hybrid.then(|| voxelizer.cutoff().into()),
+        passes_ms,
+        upload_ms: Some(upload_ms),
+        samples_ms,
+        download_ms: Some(start.elapsed().as_secs_f64() * 1e3),
+    })
+}

@@ -1,0 +1,103 @@
+//! What can go wrong on a GPU.
+
+/// Why a GPU did not voxelize.
+#[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GpuError {
+    /// There is no adapter at all.
+    #[error(
+        "no GPU adapter found; install the driver of your GPU (on Debian and Ubuntu `mesa-vulkan-drivers` has those of AMD, \
+         Intel and a software one), or use the CPU backend"
+    )]
+    NoAdapter,
+    /// No adapter has the name asked for.
+    #[error("no GPU adapter's name or driver contains `{wanted}`; there are: {}", list(there))]
+    NoSuchAdapter {
+        /// What was asked for.
+        wanted: String,
+        /// The names of those there are.
+        there: Vec<String>,
+    },
+    /// Only software adapters were found, and none was asked for by name.
+    #[error(
+        "only software adapters found ({}), which are slower than the CPU backend; name one to use it anyway",
+        list(.0)
+    )]
+    OnlySoftware(Vec<String>),
+    /// The adapter gave no device.
+    #[error("{adapter}: cannot open the device: {reason}")]
+    Device {
+        /// The adapter.
+        adapter: String,
+        /// The driver's reason.
+        reason: String,
+    },
+    /// The adapter computes wrong voxels, so it is not used.
+    #[error(
+        "{adapter}: refused, because it computes wrong voxels: {reason}; update the driver, choose another adapter or use \
+         the CPU backend"
+    )]
+    WrongVoxels {
+        /// The adapter and its driver.
+        adapter: String,
+        /// What was wrong in the start-up check.
+        reason: String,
+    },
+    /// Memory ran out.
+    #[error("{adapter}: out of GPU memory; choose a lower resolution, or use the CPU backend")]
+    OutOfMemory {
+        /// The adapter.
+        adapter: String,
+    },
+    /// The device was lost.
+    #[error("{adapter}: the device was lost ({reason}); nothing was written: run again, or use the CPU backend")]
+    Lost {
+        /// The adapter.
+        adapter: String,
+        /// The driver's reason.
+        reason: String,
+    },
+    /// The driver or wgpu refused something.
+    #[error("{adapter}: {reason}")]
+    Refused {
+        /// The adapter.
+        adapter: String,
+        /// Its reason.
+        reason: String,
+    },
+    /// The strategy is not one of the GPU's.
+    #[error("the gpu backend has no strategy `{0}`")]
+    Strategy(trixel::Strategy),
+    /// A grid whose single plane of voxels does not fit a binding.
+    #[error(
+        "one plane of the grid takes {needed} bytes, and {adapter} binds {limit} at most; choose a coarser grid, or use the \
+         CPU backend"
+    )]
+    PlaneTooLarge {
+        /// The adapter.
+        adapter: String,
+        /// Bytes of a plane.
+        needed: u64,
+        /// Bytes of the largest binding.
+        limit: u64,
+    },
+    /// The volume has another grid than the job.
+    #[error("the volume's grid is not the job's")]
+    GridMismatch,
+    /// Triangles of a caller's own buffers are too large for the shaders.
+    #[error(
+        "{0} triangles are 8192 voxels or longer along an axis, too long for the shaders' arithmetic; upload the mesh with \
+         `GpuMesh::upload`, which gives these to the CPU, or split them"
+    )]
+    TrianglesTooLarge(u64),
+    /// More pairs of triangle and column than 32 bits count.
+    #[error("`balanced` would need more than 2^32 invocations for this mesh and grid; use `hybrid`")]
+    TooManyColumns,
+    /// The part of the mesh that the CPU does failed.
+    #[error(transparent)]
+    Cpu(#[from] trixel::Error),
+}
+
+fn list(names: &[String]) -> String {
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}

@@ -1,0 +1,40 @@
+//! Exact mesh voxelization on any GPU, through wgpu: \[HCV\] chapter 3.
+//!
+//! Every strategy gives precisely the voxels that [`trixel::Mode`] defines, on every driver. The shaders use what WebGPU has
+//! everywhere: 32-bit integers and floats, storage buffers, atomics, and a rasterizer. Floats only ever estimate, with an
+//! error bound; what they leave open is decided in integers of 64 and 96 bits.
+//!
+//! Uploading, voxelizing and reading back are separate: [`GpuMesh`], [`Voxelizer`], [`GpuVolume`]. [`GpuBackend`] does all
+//! three, as a [`trixel::Backend`].
+
+mod adapter;
+mod backend;
+mod counters;
+mod cutoff;
+mod error;
+mod gpu;
+mod limits;
+mod mesh;
+mod passes;
+mod pipelines;
+mod probe;
+mod shader;
+mod timer;
+mod tune;
+mod volume;
+mod voxelizer;
+
+pub use wgpu;
+
+pub use adapter::{AdapterChoice, AdapterInfo, adapters, hardware_is_possible};
+pub use backend::GpuBackend;
+pub use counters::Counters;
+pub use cutoff::{Cutoff, Dilation, Heuristic};
+pub use error::GpuError;
+pub use gpu::Gpu;
+pub use limits::MAX_EXTENT;
+pub use mesh::GpuMesh;
+pub use timer::PassTime;
+pub use tune::{Sample, Tuning, tune};
+pub use volume::{GpuVolume, Slab};
+pub use voxelizer::{Classification, Options, STRATEGIES, Voxelizer};

@@ -1,0 +1,70 @@
+//! Every limit, derived in one place.
+
+use trixel::Mode;
+use trixel::lattice::STEP_BITS;
+
+/// Triangles this long along an axis, in lattice steps (8192 voxels), do not fit the shaders' 32-bit arithmetic; the CPU
+/// voxelizes them.
+pub const MAX_EXTENT: i64 = 1 << 29;
+
+/// Invocations of a workgroup.
+pub(crate) const WORKGROUP: u32 = 64;
+
+/// Elements that one workgroup of `scan.wgsl` sums.
+pub(crate) const SCAN_BLOCK: u32 = 1024;
+
+/// Iterations after which lavapipe ends the loops of an invocation, all of them together, without an error.
+const SAFE_ITERATIONS: u32 = 65_535;
+
+/// What an adapter allows, as trixel needs it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limits {
+    /// Bytes of a storage buffer that a shader sees at once.
+    pub(crate) binding_bytes: u64,
+    /// Pixels along a side of a raster target.
+    pub(crate) target_size: u32,
+    /// Workgroups along one dimension of a dispatch.
+    pub(crate) groups: u32,
+    /// Bytes between the parameter sets of consecutive dispatches.
+    pub(crate) parameter_stride: u32,
+}
+
+impl Limits {
+    /// From a device's limits.
+    pub(crate) fn new(device: &wgpu::Limits) -> Self {
+        // Sizes of bindings must be multiples of 4 and word indices fit 32 bits.
+        let binding_bytes = device.max_storage_buffer_binding_size.min(device.max_buffer_size).min(1 << 32) & !3;
+        Self {
+            binding_bytes,
+            target_size: device.max_texture_dimension_2d.min(8192),
+            groups: device.max_compute_workgroups_per_dimension.min(65_535),
+            parameter_stride: device.min_uniform_buffer_offset_alignment.max(256),
+        }
+    }
+
+    /// Triangles, or vertices, of which one binding holds three words each.
+    pub(crate) fn chunk_elements(&self) -> usize {
+        // 15 vertices a triangle must stay within 32 bits, and a dispatch within its two dimensions.
+        usize::try_from((self.binding_bytes / 12).min(1 << 24)).unwrap_or(1 << 24)
+    }
+
+    /// Planes of constant x that fit one binding, for columns of so many bytes.
+    pub(crate) fn slab_planes(&self, plane_bytes: u64) -> u64 {
+        self.binding_bytes / plane_bytes.max(1)
+    }
+
+    /// The two dimensions of a dispatch of at least so many workgroups.
+    pub(crate) fn dispatch(&self, groups: u32) -> [u32; 2] {
+        let width = groups.min(self.groups).max(1);
+        [width, groups.div_ceil(width)]
+    }
+}
+
+/// Columns of one triangle that one invocation may take, so that every driver finishes its loops.
+pub(crate) fn columns_per_invocation(mode: Mode, overlap_steps: u32) -> u32 {
+    let overlap_voxels = overlap_steps.div_ceil(1 << STEP_BITS);
+    match mode {
+        Mode::Sliced => SAFE_ITERATIONS / 4 / (3 + 2 * overlap_voxels.div_ceil(32)),
+        _ => SAFE_ITERATIONS / 4,
+    }
+}

@@ -1,0 +1,178 @@
+//! Pipelines, built when first needed and kept.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::shader::{self, Stage, Variant};
+
+/// Which shader stages see a binding, and how.
+#[derive(Clone, Copy)]
+enum Slot {
+    Parameters,
+    Read(wgpu::ShaderStages),
+    Write(wgpu::ShaderStages),
+}
+
+const COMPUTE: wgpu::ShaderStages = wgpu::ShaderStages::COMPUTE;
+const VERTEX: wgpu::ShaderStages = wgpu::ShaderStages::VERTEX;
+
+/// The format of the raster target, which nothing is ever written to: WebGPU wants one.
+pub(crate) const TARGET_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
+
+#[derive(Debug)]
+pub(crate) struct Pipelines {
+    layouts: Layouts,
+    built: Mutex<HashMap<(Stage, Variant), Pipeline>>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) enum Pipeline {
+    Compute(Arc<wgpu::ComputePipeline>),
+    Raster(Arc<wgpu::RenderPipeline>),
+}
+
+/// The layouts of bind groups. `common` is group 0 of all stages that know the parameters.
+#[derive(Debug)]
+pub(crate) struct Layouts {
+    pub(crate) common: wgpu::BindGroupLayout,
+    pub(crate) list_write: wgpu::BindGroupLayout,
+    pub(crate) list_read: wgpu::BindGroupLayout,
+    pub(crate) list_draw: wgpu::BindGroupLayout,
+    pub(crate) classify: wgpu::BindGroupLayout,
+    pub(crate) columns: wgpu::BindGroupLayout,
+    pub(crate) scan: wgpu::BindGroupLayout,
+    pub(crate) arguments: wgpu::BindGroupLayout,
+}
+
+impl Layouts {
+    fn new(device: &wgpu::Device) -> Self {
+        let all = VERTEX | wgpu::ShaderStages::FRAGMENT | COMPUTE;
+        let writers = wgpu::ShaderStages::FRAGMENT | COMPUTE;
+        let write = Slot::Write(COMPUTE);
+        let read = Slot::Read(COMPUTE);
+        Self {
+            common: layout(
+                device,
+                &[Slot::Parameters, Slot::Read(all), Slot::Read(all), Slot::Write(writers), Slot::Write(writers)],
+            ),
+            list_write: layout(device, &[write, write]),
+            list_read: layout(device, &[read, read]),
+            list_draw: layout(device, &[Slot::Read(VERTEX)]),
+            classify: layout(device, &[write, write, write, write]),
+            columns: layout(device, &[write]),
+            scan: layout(device, &[Slot::Parameters, write, write]),
+            arguments: layout(device, &[read, write]),
+        }
+    }
+
+    fn of(&self, stage: Stage) -> [Option<&wgpu::BindGroupLayout>; 2] {
+        let second = match stage {
+            Stage::TriangleParallel { .. } => Some(&self.list_write),
+            Stage::TriangleList | Stage::Balanced => Some(&self.list_read),
+            Stage::Classify => Some(&self.classify),
+            Stage::FragmentParallel { .. } => Some(&self.list_draw),
+            Stage::CountColumns => Some(&self.columns),
+            Stage::Fill | Stage::ScanBlocks | Stage::AddTotals | Stage::Arguments { .. } => None,
+        };
+        let first = match stage {
+            Stage::ScanBlocks | Stage::AddTotals => &self.scan,
+            Stage::Arguments { .. } => &self.arguments,
+            _ => &self.common,
+        };
+        [Some(first), second]
+    }
+}
+
+fn layout(device: &wgpu::Device, slots: &[Slot]) -> wgpu::BindGroupLayout {
+    let entries: Vec<_> = (0u32..)
+        .zip(slots)
+        .map(|(binding, slot)| {
+            let storage = |read_only| wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Storage { read_only },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            };
+            let (visibility, ty) = match slot {
+                Slot::Parameters => (
+                    VERTEX | wgpu::ShaderStages::FRAGMENT | COMPUTE,
+                    wgpu::BindingType::Buffer {
+                        ty: wgpu::BufferBindingType::Uniform,
+                        has_dynamic_offset: true,
+                        min_binding_size: None,
+                    },
+                ),
+                Slot::Read(visibility) => (*visibility, storage(true)),
+                Slot::Write(visibility) => (*visibility, storage(false)),
+            };
+            wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None }
+        })
+        .collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
+}
+
+impl Pipelines {
+    pub(crate) fn new(device: &wgpu::Device) -> Self {
+        Self { layouts: Layouts::new(device), built: Mutex::default() }
+    }
+
+    pub(crate) fn layouts(&self) -> &Layouts {
+        &self.layouts
+    }
+
+    /// The pipeline of a stage. Errors go to the device's error scopes.
+    pub(crate) fn get(&self, device: &wgpu::Device, stage: Stage, variant: Variant, max_groups: u32) -> Pipeline {
+        let mut built = self.built.lock().unwrap_or_else(PoisonError::into_inner);
+        built.entry((stage, variant)).or_insert_with(|| self.build(device, stage, variant, max_groups)).clone()
+    }
+
+    fn build(&self, device: &wgpu::Device, stage: Stage, variant: Variant, max_groups: u32) -> Pipeline {
+        let label = Some(stage.entry_point());
+        let source = shader::source(stage, variant, max_groups);
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label,
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        });
+        let groups = self.layouts.of(stage);
+        let groups: &[_] = if groups[1].is_some() { &groups } else { &groups[..1] };
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label,
+            bind_group_layouts: groups,
+            immediate_size: 0,
+        });
+        if !matches!(stage, Stage::FragmentParallel { .. }) {
+            return Pipeline::Compute(Arc::new(device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label,
+                layout: Some(&layout),
+                module: &module,
+                entry_point: label,
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                cache: None,
+            })));
+        }
+        Pipeline::Raster(Arc::new(device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label,
+            layout: Some(&layout),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("dilate"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: None,
+            multisample: wgpu::MultisampleState::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: label,
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                targets: &[Some(wgpu::ColorTargetState {
+                    format: TARGET_FORMAT,
+                    blend: None,
+                    write_mask: wgpu::ColorWrites::empty(),
+                })],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })))
+    }
+}

@@ -1,0 +1,116 @@
+//! Voxels on the GPU.
+
+use trixel::{Grid, Volume, WORD_BITS};
+
+use crate::error::GpuError;
+use crate::gpu::Gpu;
+
+/// The voxels of a grid in buffers of a [`Gpu`], one bit each, laid out as in [`Volume`]: bits along z in `u32` words
+/// (an even number a column), columns with y fastest, then x. Grids larger than a binding are cut into slabs along x.
+#[derive(Debug)]
+pub struct GpuVolume {
+    grid: Grid,
+    /// `u32` words of one column.
+    pub(crate) column_words: u32,
+    slabs: Vec<Slab>,
+}
+
+/// The voxels with `x` to `x + nx` of a [`GpuVolume`].
+#[derive(Debug)]
+pub struct Slab {
+    buffer: wgpu::Buffer,
+    x: u32,
+    nx: u32,
+}
+
+impl Slab {
+    /// The buffer: storage, and source and target of copies.
+    #[must_use]
+    pub fn buffer(&self) -> &wgpu::Buffer {
+        &self.buffer
+    }
+
+    /// The first x.
+    #[must_use]
+    pub fn x(&self) -> u32 {
+        self.x
+    }
+
+    /// How many x.
+    #[must_use]
+    pub fn nx(&self) -> u32 {
+        self.nx
+    }
+}
+
+impl GpuVolume {
+    /// Room for the voxels of `grid`; its contents are whatever the device gives until something is voxelized.
+    ///
+    /// # Errors
+    /// When GPU memory runs out, or a single plane of the grid exceeds what the adapter binds.
+    pub fn new(gpu: &Gpu, grid: Grid) -> Result<Self, GpuError> {
+        let [nx, ny, nz] = grid.dims();
+        let column_words = nz.div_ceil(WORD_BITS) * 2;
+        let plane_bytes = u64::from(ny) * u64::from(column_words) * 4;
+        let planes = gpu.limits().slab_planes(plane_bytes);
+        let Some(step) = u32::try_from(planes.min(u64::from(nx))).ok().filter(|step| *step > 0) else {
+            return Err(GpuError::PlaneTooLarge {
+                adapter: gpu.info().to_string(),
+                needed: plane_bytes,
+                limit: gpu.limits().binding_bytes,
+            });
+        };
+        let usage =
+            wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        let slabs = (0..nx)
+            .step_by(step as usize)
+            .map(|x| {
+                let nx = step.min(nx - x);
+                Ok(Slab { buffer: gpu.buffer("trixel voxels", u64::from(nx) * plane_bytes, usage)?, x, nx })
+            })
+            .collect::<Result<_, GpuError>>()?;
+        Ok(Self { grid, column_words, slabs })
+    }
+
+    /// The grid.
+    #[must_use]
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The buffers, in the order of x.
+    #[must_use]
+    pub fn slabs(&self) -> &[Slab] {
+        &self.slabs
+    }
+
+    pub(crate) fn slab_bytes(&self, slab: &Slab) -> u64 {
+        u64::from(slab.nx) * u64::from(self.grid.dims()[1]) * u64::from(self.column_words) * 4
+    }
+
+    /// Copies the voxels into `volume`, after everything submitted so far.
+    ///
+    /// # Errors
+    /// When the grids differ, memory runs out or the device is lost.
+    pub fn download(&self, gpu: &Gpu, volume: &mut Volume) -> Result<(), GpuError> {
+        if *volume.grid() != self.grid {
+            return Err(GpuError::GridMismatch);
+        }
+        let largest = self.slabs.iter().map(|slab| self.slab_bytes(slab)).max().unwrap_or(0);
+        let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
+        let staging = gpu.buffer("trixel download", largest, usage)?;
+        let mut rest = bytemuck::cast_slice_mut::<u64, u8>(volume.words_mut());
+        for slab in &self.slabs {
+            let bytes = self.slab_bytes(slab);
+            gpu.guarded(|| {
+                let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                encoder.copy_buffer_to_buffer(&slab.buffer, 0, &staging, 0, bytes);
+                gpu.queue().submit([encoder.finish()]);
+            })?;
+            let (part, others) = rest.split_at_mut(usize::try_from(bytes).unwrap_or(usize::MAX));
+            gpu.read(&staging, bytes, |voxels| part.copy_from_slice(voxels))?;
+            rest = others;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,281 @@
+//! Voxelizing meshes that are on the GPU, into voxels that stay there.
+
+use trixel::lattice::LatticeMesh;
+use trixel::{Backend, CpuBackend, Grid, Job, Mode, Strategy, Volume};
+
+use crate::counters::{self, Counters};
+use crate::cutoff::{Cutoff, Dilation};
+use crate::error::GpuError;
+use crate::gpu::Gpu;
+use crate::mesh::GpuMesh;
+use crate::passes::{self, Scratch};
+use crate::shader::Variant;
+use crate::timer::{PassTime, Timer};
+use crate::volume::GpuVolume;
+
+/// The strategies of this backend.
+pub const STRATEGIES: [Strategy; 5] = [
+    Strategy::TriangleParallel,
+    Strategy::FragmentParallel,
+    Strategy::Hybrid,
+    Strategy::HybridTwoPass,
+    Strategy::Balanced,
+];
+
+/// How to voxelize; nothing here changes which voxels are set.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    /// From which size on the hybrids call a triangle large; by default [`Cutoff::default_for`] the adapter.
+    pub cutoff: Option<Cutoff>,
+    /// How triangles are dilated for the rasterizer.
+    pub dilation: Dilation,
+    /// Whether to count what [`Counters`] holds. Costs time.
+    pub count: bool,
+}
+
+/// Voxelizes meshes by one job, keeping its buffers between runs.
+///
+/// ```no_run
+/// use trixel::lattice::LatticeMesh;
+/// use trixel::{Grid, Job, Mode, Volume};
+/// use trixel_gpu::{AdapterChoice, Gpu, GpuMesh, GpuVolume, Options, Voxelizer};
+///
+/// let mesh = trixel::scene::build("torus")?;
+/// let grid = Grid::fit(&mesh.bounds().expect("a torus has triangles"), 256)?;
+/// let job = Job::new(grid, Mode::Conservative);
+///
+/// let gpu = Gpu::open(&AdapterChoice::Any)?;
+/// let on_gpu = GpuMesh::upload(&gpu, &LatticeMesh::snap(&mesh, &grid)?)?;
+/// let voxels = GpuVolume::new(&gpu, grid)?;
+/// let mut voxelizer = Voxelizer::new(&gpu, &job, &Options::default())?;
+/// voxelizer.run(&on_gpu, &voxels)?;
+///
+/// let mut volume = Volume::new(grid)?;
+/// voxels.download(&gpu, &mut volume)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Voxelizer {
+    gpu: Gpu,
+    job: Job,
+    strategy: Strategy,
+    dilation: Dilation,
+    cutoff: Cutoff,
+    variant: Variant,
+    scratch: Scratch,
+    timer: Option<Timer>,
+}
+
+/// A sorting of a mesh's triangles into small and large that [`Voxelizer::record_classified`] uses again and again:
+/// \[HCV\] chapter 5's pre-classified form for static meshes.
+#[derive(Debug)]
+pub struct Classification {
+    pub(crate) units: Vec<passes::Lists>,
+}
+
+impl Voxelizer {
+    /// A voxelizer for a job.
+    ///
+    /// # Errors
+    /// When the job's strategy is not the GPU's, or memory runs out.
+    pub fn new(gpu: &Gpu, job: &Job, options: &Options) -> Result<Self, GpuError> {
+        let strategy = match job.strategy() {
+            Strategy::Auto => Strategy::Hybrid,
+            strategy if STRATEGIES.contains(&strategy) => strategy,
+            other => return Err(GpuError::Strategy(other)),
+        };
+        Ok(Self {
+            gpu: gpu.clone(),
+            job: *job,
+            strategy,
+            dilation: options.dilation,
+            cutoff: options.cutoff.unwrap_or_else(|| Cutoff::default_for(gpu.info(), Default::default())),
+            variant: Variant { mode: job.mode(), counting: options.count },
+            scratch: Scratch::new(gpu)?,
+            timer: Timer::new(gpu)?,
+        })
+    }
+
+    /// The strategy in use.
+    #[must_use]
+    pub fn strategy(&self) -> Strategy {
+        self.strategy
+    }
+
+    /// The cutoff in use.
+    #[must_use]
+    pub fn cutoff(&self) -> Cutoff {
+        self.cutoff
+    }
+
+    /// Builds the pipelines, which the first run would do otherwise.
+    ///
+    /// # Errors
+    /// When a shader is refused or memory runs out.
+    pub fn prepare(&mut self) -> Result<(), GpuError> {
+        let nothing = GpuMesh::empty(&self.gpu)?;
+        let grid = Grid::new([0.0; 3], [1.0; 3], [1; 3]).map_err(trixel::Error::from)?;
+        let volume = GpuVolume::new(&self.gpu, grid)?;
+        let mode = self.job.mode();
+        let job = std::mem::replace(&mut self.job, Job::new(grid, mode));
+        let ran = self.run(&nothing, &volume);
+        self.job = job;
+        ran
+    }
+
+    /// Changes the cutoff for the runs that follow.
+    pub fn set_cutoff(&mut self, cutoff: Cutoff) {
+        self.cutoff = cutoff;
+    }
+
+    /// Records everything that overwrites `volume` with the voxels of `mesh`. Nothing runs before the encoder's commands
+    /// are submitted; call [`Voxelizer::check`] after that.
+    ///
+    /// # Errors
+    /// When the volume's grid is not the job's, a shader is refused, or memory runs out.
+    pub fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        mesh: &GpuMesh,
+        volume: &GpuVolume,
+    ) -> Result<(), GpuError> {
+        self.record_with(encoder, mesh, volume, None)
+    }
+
+    /// Sorts the triangles of `mesh` into small and large, for [`Voxelizer::record_classified`]. Runs at once.
+    ///
+    /// # Errors
+    /// As for [`Voxelizer::record`].
+    pub fn classify(&mut self, mesh: &GpuMesh, volume: &GpuVolume) -> Result<Classification, GpuError> {
+        let mut encoder = self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut recorder = self.recorder(mesh, volume)?;
+        let classification = recorder.classify_all(&mut encoder)?;
+        self.gpu.guarded(|| self.gpu.queue().submit([encoder.finish()]))?;
+        Ok(classification)
+    }
+
+    /// [`Voxelizer::record`] with the classification made before: the second half of [`Strategy::HybridTwoPass`].
+    ///
+    /// # Errors
+    /// As for [`Voxelizer::record`]. The classification must be of this mesh and volume.
+    pub fn record_classified(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        mesh: &GpuMesh,
+        volume: &GpuVolume,
+        classification: &Classification,
+    ) -> Result<(), GpuError> {
+        self.record_with(encoder, mesh, volume, Some(classification))
+    }
+
+    fn record_with(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        mesh: &GpuMesh,
+        volume: &GpuVolume,
+        classification: Option<&Classification>,
+    ) -> Result<(), GpuError> {
+        let strategy = if classification.is_some() { Strategy::HybridTwoPass } else { self.strategy };
+        let initial = self.cpu_part(mesh)?;
+        let gpu = self.gpu.clone();
+        // One guard around everything: most of what is recorded is only checked by the driver much later.
+        let recorded = gpu.guarded(|| self.recorder(mesh, volume)?.record(encoder, strategy, classification, initial.as_ref()))?;
+        recorded
+    }
+
+    fn recorder<'a>(&'a mut self, mesh: &'a GpuMesh, volume: &'a GpuVolume) -> Result<passes::Recorder<'a>, GpuError> {
+        if volume.grid() != self.job.grid() {
+            return Err(GpuError::GridMismatch);
+        }
+        if let Some(timer) = &mut self.timer {
+            timer.restart();
+        }
+        passes::Recorder::new(passes::Setting {
+            gpu: &self.gpu,
+            job: &self.job,
+            variant: self.variant,
+            dilation: self.dilation,
+            cutoff: self.cutoff,
+            mesh,
+            volume,
+            scratch: &mut self.scratch,
+            timer: self.timer.as_mut(),
+        })
+    }
+
+    /// What the triangles too large for the shaders set; in mode solid as toggles.
+    fn cpu_part(&self, mesh: &GpuMesh) -> Result<Option<Volume>, GpuError> {
+        let Some(leftover) = &mesh.leftover else { return Ok(None) };
+        let mesh: LatticeMesh<'_> = leftover.mesh();
+        let mut volume = Volume::new(*self.job.grid()).map_err(trixel::Error::from)?;
+        CpuBackend::default().voxelize(&mesh, &self.job.with_strategy(Strategy::Auto), &mut volume)?;
+        if self.job.mode() == Mode::Solid {
+            let column_words = volume.column_words();
+            for column in volume.words_mut().chunks_exact_mut(column_words) {
+                let mut below = 0;
+                for word in column {
+                    let inside = *word;
+                    *word ^= inside << 1 | below;
+                    below = inside >> 63;
+                }
+            }
+        }
+        Ok(Some(volume))
+    }
+
+    /// Records, submits, waits and checks.
+    ///
+    /// # Errors
+    /// As for [`Voxelizer::record`] and [`Voxelizer::check`].
+    pub fn run(&mut self, mesh: &GpuMesh, volume: &GpuVolume) -> Result<(), GpuError> {
+        let mut encoder = self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.record(&mut encoder, mesh, volume)?;
+        self.gpu.guarded(|| self.gpu.queue().submit([encoder.finish()]))?;
+        self.check().map(drop)
+    }
+
+    /// [`Voxelizer::run`] with a classification made before.
+    ///
+    /// # Errors
+    /// As for [`Voxelizer::run`].
+    pub fn run_classified(
+        &mut self,
+        mesh: &GpuMesh,
+        volume: &GpuVolume,
+        classification: &Classification,
+    ) -> Result<(), GpuError> {
+        let mut encoder = self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.record_classified(&mut encoder, mesh, volume, classification)?;
+        self.gpu.guarded(|| self.gpu.queue().submit([encoder.finish()]))?;
+        self.check().map(drop)
+    }
+
+    /// Waits for what was recorded last, once it is submitted, and says whether its result is whole; gives the counters,
+    /// which are 0 unless asked for.
+    ///
+    /// # Errors
+    /// When triangles were too large or columns too many, so that the result must not be used, or the device is lost.
+    pub fn check(&self) -> Result<Counters, GpuError> {
+        let (staging, bytes) = self.scratch.status();
+        let (counters, too_large, overflown) = self.gpu.read(staging, bytes, |bytes| {
+            let (counters, too_large) = counters::parse(bytes);
+            let totals = bytes.get(usize::try_from(counters::BYTES).unwrap_or(usize::MAX)..).unwrap_or(&[]);
+            (counters, too_large, totals.as_chunks::<4>().0.contains(&[0xff; 4]))
+        })?;
+        if too_large > 0 {
+            return Err(GpuError::TrianglesTooLarge(too_large));
+        }
+        if overflown {
+            return Err(GpuError::TooManyColumns);
+        }
+        Ok(counters)
+    }
+
+    /// How long each pass of the last run took on the device; empty where the adapter has no timestamps.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn pass_times(&self) -> Result<Vec<PassTime>, GpuError> {
+        self.timer.as_ref().map_or(Ok(vec![]), |timer| timer.read(&self.gpu))
+    }
+}
