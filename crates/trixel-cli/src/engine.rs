@@ -32,6 +32,7 @@ pub(crate) struct Ran {
     pub(crate) counters: Option<CountersReport>,
     pub(crate) cutoff: Option<CutoffReport>,
     pub(crate) passes_ms: Vec<(&'static str, f64)>,
+    pub(crate) check_ms: Option<f64>,
     pub(crate) upload_ms: Option<f64>,
     pub(crate) samples_ms: Vec<f64>,
     pub(crate) download_ms: Option<f64>,
@@ -145,6 +146,7 @@ fn run_on_cpu(
         counters: None,
         cutoff: None,
         passes_ms: vec![],
+        check_ms: None,
         upload_ms: None,
         samples_ms,
         download_ms: None,
@@ -160,11 +162,15 @@ fn run_on_gpu(
     repeat: u32,
     reporter: &Reporter,
 ) -> Result<Ran, GpuError> {
+    let (voxelizer, check_ms) = reporter.stage("checking the GPU and building its pipelines", || {
+        let mut voxelizer = Voxelizer::new(gpu, job, options)?;
+        voxelizer.prepare()?;
+        Ok::<_, GpuError>(voxelizer)
+    });
+    let mut voxelizer = voxelizer?;
     let (on_gpu, upload_ms) = reporter.stage("uploading", || GpuMesh::upload(gpu, mesh));
     let on_gpu = on_gpu?;
     let voxels = GpuVolume::new(gpu, *job.grid())?;
-    let mut voxelizer = Voxelizer::new(gpu, job, options)?;
-    voxelizer.prepare()?;
     let mut samples_ms = vec![];
     for _ in 0..repeat {
         let (ran, ms) = reporter.stage("voxelizing", || voxelizer.run(&on_gpu, &voxels));
@@ -184,6 +190,7 @@ fn run_on_gpu(
         counters,
         cutoff: hybrid.then(|| voxelizer.cutoff().into()),
         passes_ms,
+        check_ms: Some(check_ms),
         upload_ms: Some(upload_ms),
         samples_ms,
         download_ms: Some(start.elapsed().as_secs_f64() * 1e3),

@@ -141,7 +141,7 @@ pub(crate) struct Stages {
     pub(crate) topology: Option<f64>,
     pub(crate) snap: f64,
     pub(crate) allocate: f64,
-    /// Opening the GPU and checking it.
+    /// Opening the GPU, checking it and building its pipelines.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) open: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -69,7 +69,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
 
     let (engine, open_ms) = reporter.stage("choosing a backend", || Engine::open(&args.method, &reporter));
     let ran = engine?.run(&lattice, &job, &mut voxels, args.repeat.get(), &reporter)?;
-    stages.open = ran.adapter.is_some().then_some(open_ms);
+    stages.open = ran.check_ms.map(|check_ms| open_ms + check_ms);
     stages.upload = ran.upload_ms;
     stages.download = ran.download_ms;
     let samples = Samples { voxelize: ran.samples_ms };

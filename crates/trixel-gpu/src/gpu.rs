@@ -1,8 +1,11 @@
 //! An open device, with the pipelines that were built on it.
 
+use std::collections::HashSet;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
+
+use trixel::{Mode, Strategy};
 
 use crate::adapter::{self, AdapterChoice, AdapterInfo};
 use crate::error::GpuError;
@@ -24,24 +27,16 @@ struct Shared {
     pipelines: Pipelines,
     /// Why the device was lost, once it was.
     lost: Arc<Mutex<Option<String>>>,
+    /// The modes and strategies in which it computes right voxels.
+    checked: Mutex<HashSet<(Mode, Strategy)>>,
 }
 
 impl Gpu {
-    /// Opens a device on the chosen adapter and checks that it computes right voxels.
-    ///
-    /// # Errors
-    /// When there is no such adapter, it gives no device, or it fails the check.
-    pub fn open(choice: &AdapterChoice) -> Result<Self, GpuError> {
-        let gpu = Self::open_unchecked(choice)?;
-        crate::probe::check(&gpu)?;
-        Ok(gpu)
-    }
-
-    /// Opens a device without the start-up check.
+    /// Opens a device on the chosen adapter.
     ///
     /// # Errors
     /// When there is no such adapter or it gives no device.
-    pub fn open_unchecked(choice: &AdapterChoice) -> Result<Self, GpuError> {
+    pub fn open(choice: &AdapterChoice) -> Result<Self, GpuError> {
         let (adapter, info) = adapter::choose(choice)?;
         let features = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
@@ -72,7 +67,7 @@ impl Gpu {
             *reason.lock().unwrap_or_else(PoisonError::into_inner) = Some(message);
         });
         let pipelines = Pipelines::new(&device);
-        Self { shared: Arc::new(Shared { device, queue, info, limits, pipelines, lost }) }
+        Self { shared: Arc::new(Shared { device, queue, info, limits, pipelines, lost, checked: Mutex::default() }) }
     }
 
     /// The device.
@@ -99,6 +94,14 @@ impl Gpu {
 
     pub(crate) fn pipelines(&self) -> &Pipelines {
         &self.shared.pipelines
+    }
+
+    pub(crate) fn is_checked(&self, mode: Mode, strategy: Strategy) -> bool {
+        self.shared.checked.lock().unwrap_or_else(PoisonError::into_inner).contains(&(mode, strategy))
+    }
+
+    pub(crate) fn set_checked(&self, mode: Mode, strategy: Strategy) {
+        self.shared.checked.lock().unwrap_or_else(PoisonError::into_inner).insert((mode, strategy));
     }
 
     pub(crate) fn has_timestamps(&self) -> bool {

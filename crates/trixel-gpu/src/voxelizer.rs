@@ -9,6 +9,7 @@ use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::mesh::GpuMesh;
 use crate::passes::{self, Scratch};
+use crate::probe;
 use crate::shader::Variant;
 use crate::timer::{PassTime, Timer};
 use crate::volume::GpuVolume;
@@ -74,11 +75,19 @@ pub struct Classification {
 }
 
 impl Voxelizer {
-    /// A voxelizer for a job.
+    /// A voxelizer for a job. The first one of its mode and strategy on a device voxelizes a small nasty scene and compares
+    /// with the CPU.
     ///
     /// # Errors
-    /// When the job's strategy is not the GPU's, or memory runs out.
+    /// When the job's strategy is not the GPU's, the device computes wrong voxels, or memory runs out.
     pub fn new(gpu: &Gpu, job: &Job, options: &Options) -> Result<Self, GpuError> {
+        let voxelizer = Self::unchecked(gpu, job, options)?;
+        probe::check(gpu, job.mode(), voxelizer.strategy)?;
+        Ok(voxelizer)
+    }
+
+    /// A voxelizer without the check.
+    pub(crate) fn unchecked(gpu: &Gpu, job: &Job, options: &Options) -> Result<Self, GpuError> {
         let strategy = match job.strategy() {
             Strategy::Auto => Strategy::Hybrid,
             strategy if STRATEGIES.contains(&strategy) => strategy,

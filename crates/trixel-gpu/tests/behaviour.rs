@@ -10,7 +10,7 @@ use trixel_gpu::{
 const DRIVERS: [&str; 2] = ["llvmpipe", "SwiftShader"];
 
 fn open(name: &str) -> Gpu {
-    Gpu::open_unchecked(&AdapterChoice::Named(name.to_owned())).unwrap_or_else(|error| panic!("{name}: {error}"))
+    Gpu::open(&AdapterChoice::Named(name.to_owned())).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 fn unit_grid(dims: [u32; 3]) -> Grid {
