@@ -323,3 +323,41 @@ fn help_and_completions_are_there() {
     assert!(bench.ok("--version").stdout.contains(env!("CARGO_PKG_VERSION")));
     assert!(Path::new(env!("CARGO_BIN_EXE_trixel")).exists());
 }
+
+/// On a software GPU, which `scripts/test` installs.
+#[test]
+fn a_gpu_gives_the_same_bytes_and_reports_itself() {
+    let bench = Bench::new();
+    bench.ok("voxelize scene:room --resolution 60 --backend cpu -o cpu.npz");
+    for strategy in ["triangle-parallel", "fragment-parallel", "hybrid", "hybrid-two-pass", "balanced"] {
+        let arguments = format!("--adapter llvmpipe --strategy {strategy} --counters --cutoff 30");
+        bench.ok(&format!("voxelize scene:room --resolution 60 {arguments} -o gpu.npz --report r.json"));
+        assert_eq!(std::fs::read(bench.path("cpu.npz")).unwrap(), std::fs::read(bench.path("gpu.npz")).unwrap());
+        let report = bench.json("r.json");
+        assert_eq!(report["backend"], "gpu");
+        assert_eq!(report["strategy"], strategy);
+        assert_eq!(report["adapter"]["software"], true);
+        assert_eq!(report["counters"]["voxels_written"], report["voxels"]);
+        for stage in ["upload", "voxelize", "download"] {
+            assert!(report["stages_ms"][stage].is_number(), "{stage}");
+        }
+    }
+    bench.ok("verify gpu.npz scene:room --adapter llvmpipe");
+    assert!(bench.ok("info --adapters").stdout.contains("llvmpipe"));
+    let curve = bench.ok("tune scene:room --resolution 20 --adapter llvmpipe --repeat 1 --dry-run").stdout;
+    assert!(curve.contains("best") && curve.contains("fragment-parallel"), "{curve}");
+}
+
+#[test]
+fn contradicting_gpu_arguments_are_refused() {
+    let bench = Bench::new();
+    for (status, arguments, words) in [
+        (2, "voxelize scene:torus -o t.npz --backend cpu --strategy hybrid", ["hybrid", "--backend gpu"]),
+        (2, "voxelize scene:torus -o t.npz --backend cpu --adapter x", ["--adapter", "--backend cpu"]),
+        (2, "voxelize scene:torus -o t.npz --backend gpu --strategy column-runs", ["column-runs", "--backend cpu"]),
+        (2, "voxelize scene:torus -o t.npz --backend gpu --cutoff -1", ["cutoff", "0 or more"]),
+        (1, "voxelize scene:torus -o t.npz --adapter no-such-gpu", ["no-such-gpu", "there are"]),
+    ] {
+        bench.fails(status, arguments, &words);
+    }
+}

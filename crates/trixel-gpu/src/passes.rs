@@ -270,18 +270,14 @@ impl<'a> Recorder<'a> {
         let read = self.list_group(list, false);
         let arguments = self.arguments_group(&list.count, &list.arguments);
         let first = self.compute_pipeline(Stage::TriangleParallel { hybrid: false });
-        let again = self.compute_pipeline(Stage::TriangleList);
+        let rest = self.compute_pipeline(Stage::TriangleList { small: false });
         let count = self.compute_pipeline(Stage::Arguments { vertices: 3 });
         let groups = self.groups(unit.chunk.triangles);
         let mut pass = self.begin(encoder, "triangle-parallel");
         run(&mut pass, &first, &unit.bind_group, unit.shares.first(), Some(&written), groups);
-        if let Some((_, later)) = unit.shares.split_first()
-            && !later.is_empty()
-        {
-            run(&mut pass, &count, &arguments, None, None, [1, 1]);
-            for share in later {
-                run_indirect(&mut pass, &again, &unit.bind_group, *share, &read, &list.arguments);
-            }
+        run(&mut pass, &count, &arguments, None, None, [1, 1]);
+        for share in &unit.shares {
+            run_indirect(&mut pass, &rest, &unit.bind_group, *share, &read, &list.arguments);
         }
         drop(pass);
         self.setting.scratch.lists = Some(lists);
@@ -317,7 +313,7 @@ impl<'a> Recorder<'a> {
                 self.classify(encoder, unit, lists);
             }
             let read = self.list_group(&lists.small, false);
-            let small = self.compute_pipeline(Stage::TriangleList);
+            let small = self.compute_pipeline(Stage::TriangleList { small: true });
             let mut pass = self.begin(encoder, "triangle-parallel");
             if let Some(share) = unit.shares.first() {
                 run_indirect(&mut pass, &small, &unit.bind_group, *share, &read, &lists.small.arguments);

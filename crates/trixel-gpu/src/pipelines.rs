@@ -68,7 +68,7 @@ impl Layouts {
     fn of(&self, stage: Stage) -> [Option<&wgpu::BindGroupLayout>; 2] {
         let second = match stage {
             Stage::TriangleParallel { .. } => Some(&self.list_write),
-            Stage::TriangleList | Stage::Balanced => Some(&self.list_read),
+            Stage::TriangleList { .. } | Stage::Balanced => Some(&self.list_read),
             Stage::Classify => Some(&self.classify),
             Stage::FragmentParallel { .. } => Some(&self.list_draw),
             Stage::CountColumns => Some(&self.columns),

@@ -14,8 +14,8 @@ macro_rules! shader {
 pub(crate) enum Stage {
     /// All triangles, one invocation each; the hybrid defers the large ones.
     TriangleParallel { hybrid: bool },
-    /// Triangles of a list, one invocation each.
-    TriangleList,
+    /// Triangles of a list, one invocation each; all small, or a share of the columns of each.
+    TriangleList { small: bool },
     /// Small and large triangles to two lists.
     Classify,
     /// The rasterizer, over all triangles or a list of them.
@@ -39,7 +39,7 @@ impl Stage {
     pub(crate) fn entry_point(self) -> &'static str {
         match self {
             Self::TriangleParallel { .. } => "triangle_parallel",
-            Self::TriangleList => "triangle_list",
+            Self::TriangleList { .. } => "triangle_list",
             Self::Classify => "classify",
             Self::FragmentParallel { .. } => "fragment_parallel",
             Self::CountColumns => "count_columns",
@@ -56,7 +56,7 @@ impl Stage {
             Self::TriangleParallel { .. } => shader!(
                 "wide" "common" "triangle" "size" "column" "columns" "voxels" "counters" "triangle_parallel"
             ),
-            Self::TriangleList => shader!("wide" "common" "triangle" "column" "columns" "voxels" "counters" "triangle_list"),
+            Self::TriangleList { .. } => shader!("wide" "common" "triangle" "column" "columns" "voxels" "counters" "triangle_list"),
             Self::Classify => shader!("wide" "common" "triangle" "size" "counters" "classify"),
             Self::FragmentParallel { .. } => {
                 shader!("wide" "common" "triangle" "column" "voxels" "counters" "fragment_parallel")
@@ -89,6 +89,8 @@ pub(crate) fn source(stage: Stage, variant: Variant, max_groups: u32) -> String 
     let mut source = format!(
         "const MODE: u32 = {mode}u;\nconst COUNTING: bool = {counting};\nconst MAX_EXTENT: u32 = {MAX_EXTENT}u;\n"
     );
+    let small = matches!(stage, Stage::TriangleParallel { .. } | Stage::TriangleList { small: true });
+    source += &format!("const SMALL: bool = {small};\n");
     match stage {
         Stage::TriangleParallel { hybrid } => source += &format!("const HYBRID: bool = {hybrid};\n"),
         Stage::FragmentParallel { listed, dilation } => {
@@ -116,7 +118,8 @@ mod tests {
         let mut stages = vec![
             Stage::TriangleParallel { hybrid: false },
             Stage::TriangleParallel { hybrid: true },
-            Stage::TriangleList,
+            Stage::TriangleList { small: false },
+            Stage::TriangleList { small: true },
             Stage::Classify,
             Stage::CountColumns,
             Stage::Balanced,

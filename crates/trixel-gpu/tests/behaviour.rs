@@ -192,7 +192,8 @@ fn counters_agree() {
             assert!(counters.atomics <= counters.voxels_written + counters.voxel_tests);
             match strategy {
                 Strategy::TriangleParallel => {
-                    assert_eq!(counters.invocations, triangles);
+                    // Those across 64 voxels or more take a second one.
+                    assert!((triangles..2 * triangles).contains(&counters.invocations));
                     assert_eq!(counters.fragments, 0);
                 }
                 Strategy::FragmentParallel => {

@@ -24,7 +24,8 @@ fn classify(
         return;
     }
     let columns = rect_columns(column_rect(shape.base, shape.extent, shape.flags & AXIS_MASK));
-    if columns > params.max_columns || size_of(shape) >= params.cutoff {
+    let fits = columns <= params.max_columns && is_small(shape.extent);
+    if !fits || size_of(shape) >= params.cutoff {
         large[atomicAdd(&large_count, 1u)] = i;
     } else if columns > 0u {
         small[atomicAdd(&small_count, 1u)] = i;

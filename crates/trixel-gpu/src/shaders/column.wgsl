@@ -2,6 +2,9 @@
 
 // For three edges at once: n.p >= t, with n and t cut in halves of 16 bits so that nothing leaves 32.
 fn edges_pass(na: vec3<i32>, nb: vec3<i32>, t_high: vec3<i32>, t_low: vec3<u32>, a: i32, b: i32) -> bool {
+    if SMALL {
+        return all(na * a + nb * b >= t_high);
+    }
     let mask = vec3<i32>(0xffff);
     let shift = vec3<u32>(16u);
     let low = (na & mask) * a + (nb & mask) * b - vec3<i32>(t_low);

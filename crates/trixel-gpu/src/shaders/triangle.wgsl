@@ -2,14 +2,14 @@
 //
 // All coordinates are swizzled to (a, b, c) with columns along c, and local: voxel indices count from `base`, the low
 // corner of the triangle's box of voxels. Extents below 2^29 steps (MAX_EXTENT in limits.rs) keep every 32-bit number
-// here in range.
+// here in range. Where SMALL, they are below 2^22 (64 voxels), and fewer numbers need to be cut in halves.
 
 struct Triangle {
     // Components of the three edges; edge k starts at corner k.
     ea: vec3<i32>,
     eb: vec3<i32>,
     ec: vec3<i32>,
-    // Thresholds t of `n.p >= t` for the three edges in a projection, as t = high * 2^16 + low.
+    // Thresholds t of `n.p >= t` for the three edges in a projection, as t = high * 2^16 + low; where SMALL, all of t.
     ab_high: vec3<i32>,
     bc_high: vec3<i32>,
     ca_high: vec3<i32>,
@@ -141,14 +141,20 @@ fn column_rect(base: vec3<i32>, extent: vec3<i32>, axis: u32) -> vec4<i32> {
     return vec4<i32>(low.xy, high.xy);
 }
 
+// Whether SMALL arithmetic suffices.
+fn is_small(extent: vec3<i32>) -> bool {
+    return all(extent < vec3<i32>(64));
+}
+
 fn rect_columns(rect: vec4<i32>) -> u32 {
     let size = max(rect.zw - rect.xy + 1, vec2<i32>(0));
     return u32(size.x) * u32(size.y);
 }
 
-// t of `n.p >= t` for the edge with inward normal (na, nb) through (va, vb): DESIGN section 1. As (high, low).
+// t of `n.p >= t` for the edge with inward normal (na, nb) through (va, vb): DESIGN section 1. As (high, low) halves, or
+// where SMALL whole in the first.
 fn edge_threshold(na: i32, nb: i32, va: i32, vb: i32) -> vec2<i32> {
-    // nv + S - 1 - reach * S / 2, of which the 48 upper bits are the rounded-up quotient.
+    // t = ceil((nv - reach S / 2) / S): of nv + round - reach S / 2, the bits above the 16 lowest.
     var reach = na + nb;
     var round = STEPS - 1;
     if MODE == CONSERVATIVE {
@@ -158,6 +164,15 @@ fn edge_threshold(na: i32, nb: i32, va: i32, vb: i32) -> vec2<i32> {
     } else if !(na > 0 || (na == 0 && nb > 0)) {
         // The centre on this edge is outside.
         round = STEPS;
+    }
+    if SMALL {
+        // Every number is cut at 16 bits; only products of two low halves need all 32.
+        let a = u32(na & 0xffff) * u32(va & 0xffff);
+        let b = u32(nb & 0xffff) * u32(vb & 0xffff);
+        let low = i32(a & 0xffffu) + i32(b & 0xffffu) + (((-reach) & 1) << 15u) + round;
+        let high = i32(a >> 16u) + i32(b >> 16u) + (na >> 16u) * (va & 0xffff) + (nb >> 16u) * (vb & 0xffff);
+        let whole = na * (va >> 16u) + nb * (vb >> 16u) + ((-reach) >> 1u);
+        return vec2<i32>(whole + high + (low >> 16u), 0);
     }
     var t = i64_add(i64_mul(na, va), i64_mul(nb, vb));
     t = i64_add(t, vec2<u32>(u32(round), 0u));

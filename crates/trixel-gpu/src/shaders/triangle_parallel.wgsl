@@ -1,16 +1,11 @@
 // [HCV] 3.1: one invocation a triangle, which loops over the columns of the triangle's box.
 //
-// One dispatch takes `max_columns` columns of a triangle at most, because some drivers end long loops silently. What is
-// left goes to a list, and further dispatches take their share of it from there.
+// Here the small ones; the others go to a list. Further dispatches take the list from there, `max_columns` columns of each
+// triangle at a time, because some drivers end long loops silently; or, in the hybrid, the rasterizer takes it.
 
 @group(1) @binding(0) var<storage, read_write> list: array<u32>;
 @group(1) @binding(1) var<storage, read_write> listed: atomic<u32>;
 
-fn defer(triangle: u32) {
-    list[atomicAdd(&listed, 1u)] = triangle;
-}
-
-// All triangles; those with columns left, or too large for the hybrid's cutoff, are listed.
 @compute @workgroup_size(WORKGROUP)
 fn triangle_parallel(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -34,13 +29,10 @@ fn triangle_parallel(
     if columns == 0u {
         return;
     }
-    if HYBRID {
-        if columns > params.max_columns || size_of(shape) >= params.cutoff {
-            defer(i);
-            return;
-        }
-    } else if columns > params.max_columns {
-        defer(i);
+    let fits = columns <= params.max_columns && is_small(shape.extent);
+    if !fits || (HYBRID && size_of(shape) >= params.cutoff) {
+        list[atomicAdd(&listed, 1u)] = i;
+        return;
     }
     voxelize_columns(triangle_of(shape), 0u);
     flush_counters();
