@@ -31,6 +31,7 @@
 #[doc = include_str!("../../../README.md")]
 struct Readme;
 
+pub mod attributes;
 mod backend;
 #[cfg(any(test, feature = "conformance"))]
 pub mod conformance;

@@ -74,12 +74,19 @@ impl<T: Copy> Attribute<T> {
     /// The values on the corners of triangle `triangle`, whose vertices are `vertices`; `None` where one is missing.
     #[must_use]
     pub fn on_triangle(&self, triangle: usize, vertices: [u32; 3]) -> Option<[T; 3]> {
-        let corners = match &self.corners {
-            None => vertices,
-            Some(corners) => *corners.get(triangle)?,
-        };
+        let corners = self.corners_of(triangle, vertices)?;
         let value = |corner: u32| self.values.get(corner as usize).copied();
         Some([value(corners[0])?, value(corners[1])?, value(corners[2])?])
+    }
+
+    /// The indices into `values` of the corners of triangle `triangle`, whose vertices are `vertices`; they may be
+    /// [`Attribute::NONE`] or out of range.
+    #[must_use]
+    pub fn corners_of(&self, triangle: usize, vertices: [u32; 3]) -> Option<[u32; 3]> {
+        match &self.corners {
+            None => Some(vertices),
+            Some(corners) => corners.get(triangle).copied(),
+        }
     }
 }
 

@@ -63,12 +63,18 @@ impl<'a> Rank<'a> {
     /// The place of `voxel` in the list, from 0; `None` when it is not set or outside the grid.
     #[must_use]
     pub fn of(&self, voxel: [u32; 3]) -> Option<u64> {
-        let [x, y, z] = voxel;
-        self.volume.get(voxel).then(|| {
-            let index = self.column_word(x, y) + (z / WORD_BITS) as usize;
-            let below = (1 << (z % WORD_BITS)) - 1;
-            self.before_word(index) + u64::from((self.volume.words()[index] & below).count_ones())
-        })
+        self.volume.get(voxel).then(|| self.before(voxel))
+    }
+
+    /// How many voxels are set before `voxel`, itself set or not: its place in the list if it is.
+    ///
+    /// # Panics
+    /// When the voxel is outside the grid.
+    #[must_use]
+    pub fn before(&self, [x, y, z]: [u32; 3]) -> u64 {
+        let index = self.column_word(x, y) + (z / WORD_BITS) as usize;
+        let below = (1 << (z % WORD_BITS)) - 1;
+        self.before_word(index) + u64::from((self.volume.words()[index] & below).count_ones())
     }
 
     /// How many voxels are set in the columns before `(x, y)`: the place of the column's first one. `y` may be the number
