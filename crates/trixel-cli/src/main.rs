@@ -1,6 +1,7 @@
 //! The `trixel` command.
 
 mod args;
+mod attributes;
 mod grid;
 mod info;
 mod memory;

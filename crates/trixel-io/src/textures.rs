@@ -36,12 +36,8 @@ const MOST_PIXELS: u64 = 1 << 29;
 /// ```
 pub fn decode_textures(mesh: &mut Mesh) -> Vec<String> {
     let used = used_images(mesh);
-    let sources: Vec<_> = mesh
-        .images
-        .par_iter()
-        .zip(&used)
-        .map(|(image, used)| if *used { size_of(image) } else { Ok(None) })
-        .collect();
+    let sources: Vec<_> =
+        mesh.images.par_iter().zip(&used).map(|(image, used)| if *used { size_of(image) } else { Ok(None) }).collect();
     // Counted in the file's order, so that which images are too many does not depend on threads.
     let mut room = MOST_PIXELS;
     let admitted: Vec<Result<bool, String>> = sources
@@ -49,7 +45,9 @@ pub fn decode_textures(mesh: &mut Mesh) -> Vec<String> {
         .map(|size| {
             let Some([width, height]) = size? else { return Ok(false) };
             room = room.checked_sub(u64::from(width) * u64::from(height)).ok_or_else(|| {
-                format!("the images before it have nearly {MOST_PIXELS} pixels already, which is the most; use smaller ones")
+                format!(
+                    "the images before it have nearly {MOST_PIXELS} pixels already, which is the most; use smaller ones"
+                )
             })?;
             Ok(true)
         })

@@ -100,10 +100,14 @@ mod tests {
 
     #[test]
     fn products_are_rounded_exactly() {
-        for (a, b) in [(0, 5), (FULL, FULL), (FULL, 777), (32_768, 32_768), (1, 32_767), (1, 32_768), (12_345, 54_321)] {
+        for (a, b) in [(0, 5), (FULL, FULL), (FULL, 777), (32_768, 32_768), (1, 32_767), (1, 32_768), (12_345, 54_321)]
+        {
             let exact = (f64::from(a) * f64::from(b) / f64::from(FULL)).round();
             assert_eq!(f64::from(multiply(a, b)), exact, "{a} {b}");
         }
-        assert_eq!([quantize(0.0), quantize(1.0), quantize(f32::NAN), quantize(-3.0), quantize(9.0)], [0, FULL, 0, 0, FULL]);
+        assert_eq!(
+            [quantize(0.0), quantize(1.0), quantize(f32::NAN), quantize(-3.0), quantize(9.0)],
+            [0, FULL, 0, 0, FULL]
+        );
     }
 }

@@ -10,7 +10,7 @@
 //! can change a result. `>>` rounds down.
 //!
 //! **Pairs.** A triangle counts in a set voxel when, in a surface mode, the mode's own set of that triangle alone has the
-//! voxel. For [`Mode::Solid`](crate::Mode::Solid) it counts when it meets the closed cube of twice the voxel's width
+//! voxel. For [`Mode::Solid`] it counts when it meets the closed cube of twice the voxel's width
 //! around the voxel's centre: then every voxel that touches the outside has a triangle; voxels deeper inside have none.
 //!
 //! **Point.** The attribute is read at the point of the triangle nearest to the voxel's centre, in voxel space, clamped to
@@ -69,6 +69,7 @@
 //! ```
 
 mod combine;
+mod described;
 mod light;
 mod nearest;
 mod overlap;
@@ -79,6 +80,8 @@ mod texture;
 mod vector;
 mod work;
 
+pub use described::Described;
+
 use combine::{Cell, Row, Sums, Wanted};
 use nearest::Nearest;
 use surface::{COORDINATE_BITS, EMISSION_ONE, Surface, Textures};
@@ -88,6 +91,7 @@ use crate::cpu::fragments::Pairs;
 use crate::job::Job;
 use crate::lattice::LatticeMesh;
 use crate::mesh::Mesh;
+use crate::mode::Mode;
 use crate::rank::Rank;
 use crate::volume::{Volume, set_bits};
 
@@ -303,16 +307,32 @@ impl Values {
         }
     }
 
-    /// Appends the little-endian bytes of row `row`; zeros where there is none.
-    pub fn append_row(&self, row: usize, out: &mut Vec<u8>) {
-        let start = out.len();
+    /// NumPy's name of the numbers, and how many a row has.
+    #[must_use]
+    pub fn layout(&self) -> (&'static str, u64) {
         match self {
+            Self::U8x4(_) => ("|u1", 4),
+            Self::F32x2(_) => ("<f4", 2),
+            Self::F32x3(_) => ("<f4", 3),
+            Self::U32(_) => ("<u4", 1),
+        }
+    }
+
+    /// Appends the little-endian bytes of what a voxel without a row has: zeros, and for ids 2^32 - 1.
+    pub fn append_nothing(&self, out: &mut Vec<u8>) {
+        let byte = if matches!(self, Self::U32(_)) { u8::MAX } else { 0 };
+        out.resize(out.len() + self.row_bytes(), byte);
+    }
+
+    /// Appends the little-endian bytes of row `row`; of nothing where there is none.
+    pub fn append_row(&self, row: usize, out: &mut Vec<u8>) {
+        match self {
+            _ if row >= self.len() => self.append_nothing(out),
             Self::U8x4(values) => out.extend(values.get(row).into_iter().flatten()),
             Self::F32x2(values) => out.extend(values.get(row).into_iter().flatten().flat_map(|v| v.to_le_bytes())),
             Self::F32x3(values) => out.extend(values.get(row).into_iter().flatten().flat_map(|v| v.to_le_bytes())),
             Self::U32(values) => out.extend(values.get(row).into_iter().flat_map(|v| v.to_le_bytes())),
         }
-        out.resize(start + self.row_bytes(), 0);
     }
 
     fn append(&mut self, other: Self) {
@@ -356,6 +376,8 @@ pub struct VoxelAttributes {
     /// One bit a voxel: whether it has a triangle.
     covered: Vec<u64>,
     voxels: usize,
+    /// Whether a voxel without a triangle is one that the alpha test cut out.
+    surface: bool,
 }
 
 impl VoxelAttributes {
@@ -400,6 +422,12 @@ impl VoxelAttributes {
     #[must_use]
     pub fn covered(&self) -> u64 {
         self.covered.iter().map(|word| u64::from(word.count_ones())).sum()
+    }
+
+    /// Whether the alpha test cut any voxel out: one of a surface mode, all of whose triangles it failed.
+    #[must_use]
+    pub fn cuts_out(&self) -> bool {
+        self.surface && self.covered() < self.voxels as u64
     }
 
     /// The row that stands for the voxel at place `rank`: with [`Combine::All`] its first; `None` if it has none.
@@ -469,7 +497,8 @@ pub fn compute(
     };
     #[cfg(not(feature = "threads"))]
     let parts: Vec<Part> = (0..work.count()).map(|index| task.run(&work.slab(index))).collect();
-    Ok(join(parts, request, rank.count()))
+    let surface_mode = job.mode() != Mode::Solid;
+    Ok(join(parts, request, rank.count(), surface_mode))
 }
 
 /// The rows of one slab.
@@ -479,7 +508,7 @@ struct Part {
     counts: Vec<u32>,
 }
 
-fn join(parts: Vec<Part>, request: &AttributeRequest, voxels: u64) -> VoxelAttributes {
+fn join(parts: Vec<Part>, request: &AttributeRequest, voxels: u64, surface: bool) -> VoxelAttributes {
     let mut columns: Vec<_> = request.kinds.iter().map(|&kind| (kind, kind.empty())).collect();
     // As many as there are rows, which are in memory already.
     let voxels = usize::try_from(voxels).unwrap_or(usize::MAX);
@@ -499,7 +528,7 @@ fn join(parts: Vec<Part>, request: &AttributeRequest, voxels: u64) -> VoxelAttri
             }
         }
     }
-    VoxelAttributes { columns, combine: request.combine, offsets, covered, voxels }
+    VoxelAttributes { columns, combine: request.combine, offsets, covered, voxels, surface }
 }
 
 /// What every slab needs to know.

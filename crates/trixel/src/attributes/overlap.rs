@@ -125,9 +125,8 @@ mod tests {
         let mut random = Random::new(3);
         for round in 0..300 {
             let corners = triangle(&mut random, Placement::ALL[round % 3], 0, 3, 4);
-            let e = [1, 2].map(|k| -> [f64; 3] {
-                std::array::from_fn(|i| (corners[k][i] - corners[0][i]) as f64 / S as f64)
-            });
+            let e = [1, 2]
+                .map(|k| -> [f64; 3] { std::array::from_fn(|i| (corners[k][i] - corners[0][i]) as f64 / S as f64) });
             let cross: [f64; 3] = std::array::from_fn(|i| {
                 let (j, k) = ((i + 1) % 3, (i + 2) % 3);
                 e[0][j] * e[1][k] - e[0][k] * e[1][j]

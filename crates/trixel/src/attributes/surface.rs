@@ -271,6 +271,7 @@ fn quantize_emission(value: f32) -> u32 {
 fn quantize_coordinate(value: f32) -> i64 {
     const LIMIT: f64 = (1u64 << 46) as f64;
     #[expect(clippy::cast_possible_truncation, reason = "limited; NaN becomes 0")]
-    let quantized = (f64::from(value) * f64::from(1u32 << COORDINATE_BITS)).round_ties_even().clamp(-LIMIT, LIMIT) as i64;
+    let quantized =
+        (f64::from(value) * f64::from(1u32 << COORDINATE_BITS)).round_ties_even().clamp(-LIMIT, LIMIT) as i64;
     quantized
 }

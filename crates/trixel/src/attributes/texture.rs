@@ -160,9 +160,8 @@ impl<'a> Texels<'a> {
             let fine = a[axis] + ((moved + (1 << (WEIGHT_BITS - 1))) >> WEIGHT_BITS);
             at[axis] = (fine * i64::from(size[axis])).div_euclid(i64::from(self.size[axis]));
         }
-        let texel = |x: i64, y: i64| {
-            self.fetch(level, [wrapped(x, size[0], self.wrap[0]), wrapped(y, size[1], self.wrap[1])])
-        };
+        let texel =
+            |x: i64, y: i64| self.fetch(level, [wrapped(x, size[0], self.wrap[0]), wrapped(y, size[1], self.wrap[1])]);
         if self.filter == Filter::Nearest {
             return texel(at[0] >> TEXEL_BITS, at[1] >> TEXEL_BITS);
         }
@@ -232,7 +231,8 @@ mod tests {
     #[test]
     fn odd_sizes_wrap_as_their_sampler_says() {
         let image = image(5, 3, |x, y| u8::try_from(10 * x + 100 * (y % 2)).unwrap());
-        let sample = |wrap, u, v| red(&Texels::new(texture(wrap, Filter::Nearest), &image, Encoding::Linear).unwrap(), u, v);
+        let sample =
+            |wrap, u, v| red(&Texels::new(texture(wrap, Filter::Nearest), &image, Encoding::Linear).unwrap(), u, v);
         let centre = |i: i32, n: f32| (i as f32 + 0.5) / n;
         for i in -12..17 {
             let u = centre(i, 5.0);
@@ -278,7 +278,8 @@ mod tests {
             let placement = texels.place(&used, [[bad, 1.0], [2.0, bad], [bad, bad]], f64::NAN);
             texels.sample(&placement, [W / 3, W / 3, W - 2 * (W / 3)]);
         }
-        let short = Image { name: String::new(), source: ImageSource::Rgba8 { width: 9, height: 9, pixels: vec![0; 3] } };
+        let short =
+            Image { name: String::new(), source: ImageSource::Rgba8 { width: 9, height: 9, pixels: vec![0; 3] } };
         assert!(Texels::new(texture(Wrap::Clamp, Filter::Linear), &short, Encoding::Srgb).is_none());
     }
 }

@@ -286,11 +286,14 @@ mod tests {
                     for z in 0..10 {
                         let voxel = [x, y, z];
                         let local = corners.map(|v| {
-                            std::array::from_fn(|i| i128::from(v[i]) - i128::from(S) * i128::from(voxel[i]) + i128::from(S / 2))
+                            std::array::from_fn(|i| {
+                                i128::from(v[i]) - i128::from(S) * i128::from(voxel[i]) + i128::from(S / 2)
+                            })
                         });
                         // Cubes of S x S x S from 0 on, so doubled coordinates halve exactly by doubling S instead:
                         // eight unit cubes make the doubled one.
-                        let expected = (0..8).any(|corner| oracle::conservative(local, [0, 1, 2].map(|i| corner >> i & 1)));
+                        let expected =
+                            (0..8).any(|corner| oracle::conservative(local, [0, 1, 2].map(|i| corner >> i & 1)));
                         assert_eq!(found.get(voxel), expected, "{voxel:?} {corners:?}");
                     }
                 }
