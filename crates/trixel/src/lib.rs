@@ -42,6 +42,7 @@ pub mod lattice;
 mod material;
 mod mesh;
 mod mode;
+pub mod octree;
 mod rank;
 pub mod scene;
 mod topology;

@@ -3,11 +3,11 @@
 use std::sync::OnceLock;
 
 /// Full linear light, or an alpha of 1.
-pub(super) const FULL: u16 = u16::MAX;
+pub(crate) const FULL: u16 = u16::MAX;
 
 /// `a * b` of fractions of [`FULL`], rounded.
 #[inline]
-pub(super) fn multiply(a: u16, b: u16) -> u16 {
+pub(crate) fn multiply(a: u16, b: u16) -> u16 {
     let product = u32::from(a) * u32::from(b) + (1 << 15);
     // The exact rounded quotient by 65535, without a division.
     narrow((product + (product >> 16)) >> 16)
@@ -15,12 +15,12 @@ pub(super) fn multiply(a: u16, b: u16) -> u16 {
 
 /// A number below 2^16; larger ones become the largest.
 #[inline]
-pub(super) fn narrow(value: u32) -> u16 {
+pub(crate) fn narrow(value: u32) -> u16 {
     u16::try_from(value).unwrap_or(FULL)
 }
 
 /// The fraction of [`FULL`] for a float from 0 to 1; `NaN` becomes 0.
-pub(super) fn quantize(value: f32) -> u16 {
+pub(crate) fn quantize(value: f32) -> u16 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     let quantized = (f64::from(value) * f64::from(FULL)).round_ties_even() as u16;
     quantized
@@ -56,30 +56,30 @@ fn tables() -> &'static Tables {
 
 /// The linear light of an sRGB byte.
 #[inline]
-pub(super) fn linear_of_srgb(byte: u8) -> u16 {
+pub(crate) fn linear_of_srgb(byte: u8) -> u16 {
     tables().linear[usize::from(byte)]
 }
 
 /// The sRGB byte of linear light.
 #[inline]
-pub(super) fn srgb_of_linear(value: u16) -> u8 {
+pub(crate) fn srgb_of_linear(value: u16) -> u8 {
     tables().srgb.get(usize::from(value)).copied().unwrap_or(u8::MAX)
 }
 
 /// A linear byte as a fraction of [`FULL`].
 #[inline]
-pub(super) fn widen(byte: u8) -> u16 {
+pub(crate) fn widen(byte: u8) -> u16 {
     u16::from(byte) * 257
 }
 
 /// The byte nearest to a fraction of [`FULL`].
 #[inline]
-pub(super) fn byte(value: u16) -> u8 {
+pub(crate) fn byte(value: u16) -> u8 {
     u8::try_from((u32::from(value) * 255 + 32_767) / 65_535).unwrap_or(u8::MAX)
 }
 
 /// The 8-bit sRGB colour, with alpha, of a linear one.
-pub(super) fn encode([r, g, b, a]: [u16; 4]) -> [u8; 4] {
+pub(crate) fn encode([r, g, b, a]: [u16; 4]) -> [u8; 4] {
     [srgb_of_linear(r), srgb_of_linear(g), srgb_of_linear(b), byte(a)]
 }
 

@@ -70,14 +70,14 @@
 
 mod combine;
 mod described;
-mod light;
+pub(crate) mod light;
 mod nearest;
 mod overlap;
 mod surface;
 #[cfg(test)]
 mod tests;
 mod texture;
-mod vector;
+pub(crate) mod vector;
 mod work;
 
 pub use described::Described;

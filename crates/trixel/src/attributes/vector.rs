@@ -1,10 +1,10 @@
 //! Directions as integers of 15 bits.
 
 /// The length of a unit vector.
-pub(super) const UNIT: i64 = 1 << 15;
+pub(crate) const UNIT: i64 = 1 << 15;
 
 /// The vector of length [`UNIT`] along `v`, rounded; `None` when `v` is 0. Decided on the 15 highest bits of `v`.
-pub(super) fn normalized(v: [i64; 3]) -> Option<[i64; 3]> {
+pub(crate) fn normalized(v: [i64; 3]) -> Option<[i64; 3]> {
     let largest = v.iter().map(|c| c.unsigned_abs()).max().unwrap_or(0);
     if largest == 0 {
         return None;
@@ -20,7 +20,7 @@ pub(super) fn normalized(v: [i64; 3]) -> Option<[i64; 3]> {
 }
 
 /// A direction of any length as integers; `None` when it has none.
-pub(super) fn quantized(v: [f64; 3]) -> Option<[i64; 3]> {
+pub(crate) fn quantized(v: [f64; 3]) -> Option<[i64; 3]> {
     // Scaled first, so that squares neither overflow nor vanish.
     let largest = v.iter().fold(0.0, |largest: f64, c| largest.max(c.abs()));
     if !largest.is_normal() {
@@ -37,7 +37,7 @@ pub(super) fn quantized(v: [f64; 3]) -> Option<[i64; 3]> {
 }
 
 /// The floats of a quantized direction.
-pub(super) fn floats(v: [i64; 3]) -> [f32; 3] {
+pub(crate) fn floats(v: [i64; 3]) -> [f32; 3] {
     #[expect(clippy::cast_precision_loss, reason = "at most 16 bits")]
     v.map(|c| c as f32 / UNIT as f32)
 }
