@@ -74,12 +74,11 @@ fn dense<W: Write + Seek>(
         for column in chunk * per_chunk..columns.min((chunk + 1) * per_chunk) {
             // Both are below 2^15.
             let [x, y] = [column / ny as usize, column % ny as usize].map(|i| u32::try_from(i).unwrap_or(u32::MAX));
-            let mut row = usize::try_from(described.rank().before_column(x, y)).unwrap_or(usize::MAX);
+            let first = usize::try_from(described.rank().before_column(x, y)).unwrap_or(usize::MAX);
             let mut next = 0;
-            for z in set_bits(volume.column(x, y)) {
+            for (row, z) in (first..).zip(set_bits(volume.column(x, y))) {
                 (next..z).for_each(|_| values.append_nothing(out));
                 values.append_row(row, out);
-                row += 1;
                 next = z + 1;
             }
             (next..nz).for_each(|_| values.append_nothing(out));

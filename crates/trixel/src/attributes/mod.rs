@@ -38,12 +38,18 @@
 //! 15 bits and divided by the integer square root; in the mesh's own space. Without shading normals the geometric one
 //! stands in.
 //!
+//! The geometric normal is the cross product of two edges in f64, their coordinates divided by the voxel's longest side.
+//! Both kinds of normal are divided by their largest component, then by their length, and rounded to 15 bits.
+//!
 //! **Textures.** A corner's texel coordinate is `round_ties_even(256 n (u - p))` in f64, with u after the texture's
 //! transform, n the image's side and, where it repeats, p the even whole number at or below the least corner's u. Between
 //! corners it moves by `(w_b (t_b - t_a) + w_c (t_c - t_a) + 2^15) >> 16`. Bilinear shares have 8 bits an axis; texel
 //! centres are at half a texel. Where the texture has [mipmaps](crate::Texture::mipmaps), a triangle reads the first level
 //! on which a voxel's face covers at most two texels; each level halves (rounding down, at least 1) the one below, in
 //! linear light, colours counted by alpha.
+//!
+//! What is computed in f64 (quantized colours and normals, texel coordinates of corners, the level) is computed once a
+//! vertex or triangle, by the processor; a device that repeats the rest takes it as integers.
 //!
 //! **Combining** ([`Combine`]) only adds integers and compares them. Of equal candidates the lowest triangle wins. Sums of
 //! colour are weighted by alpha; means are rounded. Normals that sum to zero become the winner's. The result is given as
@@ -348,7 +354,11 @@ impl Values {
     /// Appends what `row` has of `kind`.
     fn push(&mut self, kind: AttributeKind, row: &Row) {
         use AttributeKind as Kind;
-        #[expect(clippy::cast_precision_loss, reason = "values of at most 24 bits; larger ones are rounded")]
+        #[expect(
+            clippy::cast_precision_loss,
+            clippy::cast_possible_truncation,
+            reason = "values of at most 24 bits; larger ones are rounded"
+        )]
         match self {
             Self::U8x4(values) => values.push(light::encode(row.color)),
             Self::F32x2(values) if kind == Kind::Texcoord => {
