@@ -1,6 +1,6 @@
 //! What is in the voxels, in every format that can tell.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a failure here is a failed test")]
+#![expect(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::collections::BTreeSet;
 use std::io::{Cursor, Read};

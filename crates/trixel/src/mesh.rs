@@ -293,18 +293,12 @@ mod tests {
         let values = |shift: f32| [0.0, 1.0, 2.0, 3.0].map(|v| [v + shift, 0.0]).to_vec();
         let per_vertex = |shift| Attribute::per_vertex(values(shift));
         let corners = |shift| Attribute { values: values(shift), corners: Some(vec![[3, 2, u32::MAX - 7]]) };
-        let kinds: [fn(f32) -> Option<Attribute<[f32; 2]>>; 3] = [
-            |_| None,
-            |s| Some(Attribute::per_vertex([0.0, 1.0, 2.0, 3.0].map(|v| [v + s, 0.0]).to_vec())),
-            |s| {
-                let values = [0.0, 1.0, 2.0, 3.0].map(|v| [v + s, 0.0]).to_vec();
-                Some(Attribute { values, corners: Some(vec![[3, 2, 1]]) })
-            },
-        ];
-        for a in kinds {
-            for b in kinds {
+        let with_corners = |shift| Attribute { values: values(shift), corners: Some(vec![[3, 2, 1]]) };
+        let kinds = |shift| [None, Some(per_vertex(shift)), Some(with_corners(shift))];
+        for a in kinds(0.0) {
+            for b in kinds(10.0) {
                 let (mut mesh, mut other) = (triangle(0.0), triangle(5.0));
-                (mesh.uvs, other.uvs) = (a(0.0).into_iter().collect(), b(10.0).into_iter().collect());
+                (mesh.uvs, other.uvs) = (a.clone().into_iter().collect(), b.into_iter().collect());
                 let expected =
                     [&mesh, &other].map(|mesh| mesh.uvs.first().and_then(|uvs| uvs.on_triangle(0, [0, 1, 2])));
                 mesh.append(other).unwrap();
