@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::builder::styling::{AnsiColor, Styles};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use trixel::attributes::{AttributeKind, Combine};
 use trixel::{Grid, Job, Mode, Strategy, UpAxis};
 use trixel_gpu::{Dilation, Heuristic};
 
@@ -67,6 +68,7 @@ Examples:
   trixel voxelize part.stl --voxel-size 0.25 --mode solid -o part.vti
   trixel voxelize city.glb --dims 512 512 128 --origin 0 0 0 --voxel-size 1 -o city.vox
   trixel voxelize moved.obj --like before.npz -o after.npz
+  trixel voxelize spot.obj -r 256 --attributes color,normal --sparse -o spot.npz -o spot.vox
 
 Exit status: 0 done, 1 failed (one message on standard error says what, where, and what to do), 2 wrong usage.";
 
@@ -97,6 +99,9 @@ pub(crate) struct VoxelizeArgs {
     #[arg(long, value_name = "N", default_value = "1", help_heading = "Output")]
     pub(crate) repeat: NonZeroU32,
 
+    #[command(flatten)]
+    pub(crate) attributes: AttributeArgs,
+
     /// Write .npz as a list of set voxels (`indices`) instead of a dense array.
     #[arg(long, help_heading = "Output")]
     pub(crate) sparse: bool,
@@ -110,6 +115,106 @@ pub(crate) struct VoxelizeArgs {
     /// Say nothing but errors.
     #[arg(short, long, help_heading = "Output")]
     pub(crate) quiet: bool,
+}
+
+/// What is in the voxels.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Attributes")]
+pub(crate) struct AttributeArgs {
+    /// What to find out about every voxel, separated by commas; .npz and .vti hold all of it, .vox, .ply, .obj, .glb and
+    /// .png show the colours.
+    ///
+    /// Values are those at the point of the mesh nearest to the voxel's centre. Textures are PNG and JPEG; one that is
+    /// missing is a warning. What an alpha test cuts out stays set, with colour 0 and alpha 0, and is left out of .vox,
+    /// meshes and pictures.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
+    pub(crate) attributes: Vec<AttributeArg>,
+
+    /// How the triangles that meet in a voxel become one value.
+    #[arg(long, value_enum, default_value_t, value_name = "NAME", requires = "attributes")]
+    pub(crate) combine: CombineArg,
+
+    /// Materials from the one that matters most to the one that matters least; those not named come last. Only the
+    /// triangles of the first that a voxel has count in it.
+    #[arg(long, value_delimiter = ',', value_name = "MATERIAL,...", requires = "attributes")]
+    pub(crate) priority: Vec<String>,
+}
+
+/// [`AttributeKind`] on the command line.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum AttributeArg {
+    /// sRGB colour and alpha: vertex colour x material x texture (u8 x 4).
+    Color,
+    /// Shading normal (f32 x 3).
+    Normal,
+    /// Normal of the triangle's plane (f32 x 3).
+    #[value(alias = "geometric_normal")]
+    GeometricNormal,
+    /// First set of texture coordinates (f32 x 2).
+    Texcoord,
+    /// Number of the material (u32).
+    #[value(alias = "material_id")]
+    Material,
+    /// Number of the triangle (u32).
+    #[value(alias = "triangle_id")]
+    Triangle,
+    /// Barycentric coordinates on that triangle (f32 x 3).
+    Barycentric,
+    /// Emitted light, linear (f32 x 3).
+    Emission,
+    /// Metalness and roughness (f32 x 2).
+    #[value(alias = "metallic_roughness")]
+    MetallicRoughness,
+}
+
+impl From<AttributeArg> for AttributeKind {
+    fn from(kind: AttributeArg) -> Self {
+        match kind {
+            AttributeArg::Color => Self::Color,
+            AttributeArg::Normal => Self::Normal,
+            AttributeArg::GeometricNormal => Self::GeometricNormal,
+            AttributeArg::Texcoord => Self::Texcoord,
+            AttributeArg::Material => Self::Material,
+            AttributeArg::Triangle => Self::Triangle,
+            AttributeArg::Barycentric => Self::Barycentric,
+            AttributeArg::Emission => Self::Emission,
+            AttributeArg::MetallicRoughness => Self::MetallicRoughness,
+        }
+    }
+}
+
+/// [`Combine`] on the command line.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(crate) enum CombineArg {
+    /// The mean; ids are the nearest triangle's.
+    #[default]
+    Mean,
+    /// The mean by area inside the voxel; ids are the dominant triangle's.
+    AreaWeighted,
+    /// The triangle nearest to the voxel's centre.
+    Nearest,
+    /// The triangle with the largest area inside the voxel.
+    Dominant,
+    /// The largest of each component; ids are those of the triangle with the highest number.
+    Max,
+    /// The triangle with the lowest number.
+    First,
+    /// All of them: .npz keeps a row for each, and `offsets`; other formats show the first.
+    All,
+}
+
+impl From<CombineArg> for Combine {
+    fn from(combine: CombineArg) -> Self {
+        match combine {
+            CombineArg::Mean => Self::Mean,
+            CombineArg::AreaWeighted => Self::AreaWeighted,
+            CombineArg::Nearest => Self::Nearest,
+            CombineArg::Dominant => Self::Dominant,
+            CombineArg::Max => Self::Max,
+            CombineArg::First => Self::First,
+            CombineArg::All => Self::All,
+        }
+    }
 }
 
 /// Where the voxels are. Without any of these, `--resolution 128`.

@@ -1,6 +1,7 @@
 //! The `trixel` command.
 
 mod args;
+mod attributes;
 mod engine;
 mod grid;
 mod info;

@@ -1,6 +1,7 @@
 //! The JSON report: one object, with the fields that the documentation names.
 
 use serde::Serialize;
+use trixel::attributes::VoxelAttributes;
 use trixel::{Grid, Mesh, Topology};
 use trixel_gpu::{AdapterInfo, Counters, Cutoff};
 
@@ -20,6 +21,8 @@ pub(crate) struct Report {
     pub(crate) adapter: Option<AdapterReport>,
     /// How many voxels are set.
     pub(crate) voxels: u64,
+    /// What was found out about the voxels; null when nothing was asked.
+    pub(crate) attributes: Option<AttributesReport>,
     pub(crate) stages_ms: Stages,
     pub(crate) samples_ms: Samples,
     /// What the shaders counted, if asked to.
@@ -81,6 +84,32 @@ impl From<&AdapterInfo> for AdapterReport {
             driver: info.driver.clone(),
             backend: info.backend.clone(),
             software: info.software,
+        }
+    }
+}
+
+/// Attributes in a report.
+#[derive(Debug, Serialize)]
+pub(crate) struct AttributesReport {
+    pub(crate) names: Vec<&'static str>,
+    pub(crate) combine: &'static str,
+    /// Voxels that have a triangle; in a surface mode the others were cut out by an alpha test.
+    pub(crate) covered: u64,
+    /// Bytes that the attributes take in memory, and per set voxel.
+    pub(crate) bytes: u64,
+    pub(crate) bytes_per_voxel: f64,
+}
+
+impl From<&VoxelAttributes> for AttributesReport {
+    fn from(attributes: &VoxelAttributes) -> Self {
+        #[expect(clippy::cast_precision_loss, reason = "a ratio for people")]
+        let bytes_per_voxel = attributes.bytes() as f64 / attributes.voxels().max(1) as f64;
+        Self {
+            names: attributes.columns().iter().map(|(kind, _)| kind.name()).collect(),
+            combine: attributes.combine().name(),
+            covered: attributes.covered(),
+            bytes: attributes.bytes(),
+            bytes_per_voxel,
         }
     }
 }
@@ -147,6 +176,13 @@ pub(crate) struct Stages {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) upload: Option<f64>,
     pub(crate) voxelize: f64,
+    /// Decoding the images of the mesh's textures.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) textures: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) rank: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) attributes: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) download: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]

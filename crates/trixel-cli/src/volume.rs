@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use anyhow::{Result, anyhow, ensure};
-use trixel::{Grid, UpAxis, Volume};
+use trixel::{Grid, Volume};
 use trixel_io::VolumeFormat;
 use trixel_io::atomic_file::{AtomicFile, Staged};
 use trixel_io::write::{WriteOptions, check_target, write_volume};
-use trixel_render::{PreviewOptions, render_preview};
+use trixel_render::{PreviewOptions, render_colored_preview, render_preview};
 
 fn is_picture(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
@@ -36,11 +36,20 @@ pub(crate) fn check_output(path: &Path, grid: &Grid) -> Result<()> {
 
 /// Writes one output beside its target.
 pub(crate) fn stage_output(path: &Path, volume: &Volume, options: &WriteOptions<'_>) -> Result<Staged> {
-    if is_picture(path) { stage_picture(path, volume, options.up) } else { Ok(write_volume(path, volume, options)?) }
+    if is_picture(path) { stage_picture(path, volume, options) } else { Ok(write_volume(path, volume, options)?) }
 }
 
-fn stage_picture(path: &Path, volume: &Volume, up: UpAxis) -> Result<Staged> {
-    let picture = render_preview(volume, &PreviewOptions { up, ..PreviewOptions::default() })?;
+fn stage_picture(path: &Path, volume: &Volume, options: &WriteOptions<'_>) -> Result<Staged> {
+    let view = PreviewOptions { up: options.up, ..PreviewOptions::default() };
+    let picture = match &options.described {
+        Some(described) => {
+            let shown = described.without_cut_out()?;
+            // Deep inside a solid there is no surface to have a colour.
+            let color = |voxel| described.color(voxel).map(|[r, g, b, _]| [r, g, b]);
+            render_colored_preview(shown.as_ref().unwrap_or(volume), &color, &view)?
+        }
+        None => render_preview(volume, &view)?,
+    };
     let mut file = AtomicFile::create(path).map_err(|error| cannot_write(path, &error))?;
     picture.encode_png(&mut file).map_err(|error| cannot_write(path, &error))?;
     file.stage().map_err(|error| cannot_write(path, &error))

@@ -6,18 +6,20 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Result, bail};
+use trixel::attributes::{Described, compute};
 use trixel::lattice::LatticeMesh;
-use trixel::{Bytes, Job, Mode, Topology, Volume};
+use trixel::{Bytes, Job, Mode, Rank, Topology, Volume};
 use trixel_io::VolumeFormat;
 use trixel_io::atomic_file::{AtomicFile, Staged};
+use trixel_io::textures::decode_textures;
 use trixel_io::write::WriteOptions;
 
 use crate::args::{MethodArgs, VoxelizeArgs};
 use crate::engine::Engine;
 use crate::grid::{GridRequest, usage};
 use crate::progress::Reporter;
-use crate::report::{GridReport, MeshReport, Report, Samples, Stages, median};
-use crate::{memory, mesh, volume};
+use crate::report::{AttributesReport, GridReport, MeshReport, Report, Samples, Stages, median};
+use crate::{attributes, memory, mesh, volume};
 
 /// Left free beside a dense grid, for the mesh, the writers and everybody else.
 const RESERVE_BYTES: u64 = 256 << 20;
@@ -40,14 +42,22 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let reporter = Reporter::new(args.quiet);
     let mut stages = Stages::default();
 
-    let (loaded, read_ms) = reporter.stage(&format!("reading {input}"), || mesh::load(&input, false, &reporter));
-    let loaded = loaded?;
+    let (loaded, read_ms) = reporter
+        .stage(&format!("reading {input}"), || mesh::load(&input, !args.attributes.attributes.is_empty(), &reporter));
+    let mut loaded = loaded?;
     stages.read = read_ms;
     let up = args.up.axis().unwrap_or_else(|| mesh::up(&input, &loaded));
 
     let job = job(&args.method, request.resolve(&loaded, &reporter)?)?;
     for output in &args.outputs {
         volume::check_output(output, job.grid())?;
+    }
+
+    let request = attributes::request(&args.attributes, &loaded)?;
+    if request.is_some() {
+        let (warnings, ms) = reporter.stage("decoding textures", || decode_textures(&mut loaded));
+        warnings.into_iter().for_each(|warning| reporter.warn(format!("{input}: {warning}")));
+        stages.textures = Some(ms);
     }
 
     let topology = (job.mode() == Mode::Solid || args.report.is_some()).then(|| {
@@ -74,6 +84,21 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     stages.download = ran.download_ms;
     let samples = Samples { voxelize: ran.samples_ms };
     stages.voxelize = median(&samples.voxelize);
+    let rank = request.as_ref().map(|_| {
+        let (rank, ms) = reporter.stage("ranking", || Rank::new(&voxels));
+        stages.rank = Some(ms);
+        rank
+    });
+    let described = match &request {
+        Some(request) => {
+            let (described, ms) = reporter
+                .stage("finding attributes", || compute(&loaded, &lattice, &job, &voxels, request));
+            stages.attributes = Some(ms);
+            Some(described?)
+        }
+        None => None,
+    };
+    let described_voxels = rank.as_ref().zip(described.as_ref()).and_then(|(rank, d)| Described::new(rank, d));
     drop(lattice);
     let mesh_report = topology.map(|topology| MeshReport::new(&loaded, &topology));
     let triangles = loaded.triangles.len();
@@ -83,11 +108,20 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     if count == 0 {
         reporter.warn(empty_hint(job.mode()));
     }
+    if let Some(described) = described.as_ref().filter(|described| described.cuts_out()) {
+        let cut = described.voxels() as u64 - described.covered();
+        reporter.say(&format!("{cut} voxels lie only where an alpha test cuts the surface out; their alpha is 0"));
+    }
     let mut staged = Staged::default();
     if !args.outputs.is_empty() {
         let (written, ms) = reporter.stage("writing", || -> Result<()> {
             for output in &args.outputs {
-                let options = WriteOptions { up, sparse: args.sparse, progress: Some(&|f| reporter.fraction(f)) };
+                let options = WriteOptions {
+                    up,
+                    sparse: args.sparse,
+                    described: described_voxels,
+                    progress: Some(&|f| reporter.fraction(f)),
+                };
                 staged = std::mem::take(&mut staged).join(volume::stage_output(output, &voxels, &options)?);
             }
             Ok(())
@@ -112,6 +146,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
             threads: rayon::current_num_threads(),
             adapter: ran.adapter,
             voxels: count,
+            attributes: described.as_ref().map(AttributesReport::from),
             stages_ms: stages,
             samples_ms: samples,
             counters: ran.counters,

@@ -361,3 +361,56 @@ fn contradicting_gpu_arguments_are_refused() {
         bench.fails(status, arguments, &words);
     }
 }
+
+/// A square of two materials, one with a texture that is not there.
+fn square(bench: &Bench) {
+    bench.write(
+        "square.obj",
+        "mtllib square.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nusemtl red\nf 1/1 2/1 3/1\nusemtl blue\nf 1 3 4\n",
+    );
+    bench.write("square.mtl", "newmtl red\nKd 1 0 0\nmap_Kd broken.png\nnewmtl blue\nKd 0 0 1\n");
+    bench.write("broken.png", "not a picture");
+}
+
+#[test]
+fn attributes_are_written_and_reported() {
+    let bench = Bench::new();
+    square(&bench);
+    let arguments =
+        "voxelize square.obj -r 8 --attributes color,normal,material --combine nearest --sparse --report r.json";
+    let ran = bench.ok(&format!("{arguments} -o a.npz -o a.vox -o a.png -o a.vti -o a.ply -o a.glb -o a.obj"));
+    assert!(ran.stderr.contains("broken.png") && ran.stderr.contains("left out"), "{}", ran.stderr);
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("r.json")).unwrap()).unwrap();
+    assert_eq!(report["attributes"]["names"], serde_json::json!(["color", "normal", "material"]));
+    assert_eq!(report["attributes"]["combine"], "nearest");
+    assert_eq!(report["attributes"]["covered"], report["voxels"]);
+    for stage in ["textures", "rank", "attributes"] {
+        assert!(report["stages_ms"][stage].is_f64(), "{stage}");
+    }
+    // Red, blue: the palette has just these two.
+    let vox = std::fs::read(bench.path("a.vox")).unwrap();
+    let at = vox.windows(4).position(|window| window == b"RGBA").unwrap() + 12;
+    let mut palette: Vec<_> = vox[at..at + 12].chunks(4).collect();
+    palette.sort_unstable();
+    assert_eq!(palette, [[0, 0, 0, 255], [0, 0, 255, 255], [255, 0, 0, 255]]);
+    // Threads do not matter.
+    bench.ok(&format!("{arguments} -o b.npz -t 1"));
+    bench.ok(&format!("{arguments} -o c.npz -t 5"));
+    let read = |name: &str| std::fs::read(bench.path(name)).unwrap();
+    assert!(read("a.npz") == read("b.npz") && read("b.npz") == read("c.npz"));
+}
+
+#[test]
+fn priorities_name_materials() {
+    let bench = Bench::new();
+    square(&bench);
+    let arguments = "voxelize square.obj -r 8 --attributes material --sparse";
+    bench.ok(&format!("{arguments} --priority blue -o blue.npz"));
+    bench.ok(&format!("{arguments} --priority red,blue -o red.npz"));
+    bench.ok(&format!("{arguments} -o none.npz"));
+    let read = |name: &str| std::fs::read(bench.path(name)).unwrap();
+    assert!(read("blue.npz") != read("red.npz"));
+    bench.fails(1, &format!("{arguments} --priority green -o green.npz"), &["green", "red, blue"]);
+    bench.fails(2, "voxelize square.obj -r 8 --combine first -o a.npz", &["--attributes"]);
+    bench.fails(2, "voxelize square.obj -r 8 --attributes colour -o a.npz", &["colour", "color"]);
+}

@@ -2,6 +2,7 @@
 //!
 //! - [`read::read_mesh`] reads a mesh, with materials and what else shades it; the extension or the first bytes pick the
 //!   reader.
+//! - [`textures::decode_textures`] decodes the images that materials name, when colours are wanted.
 //! - [`write::write_volume`] writes a volume in the format that the extension names; the table in [`mod@write`] says what
 //!   each format keeps.
 //! - [`volume_read::read_volume`] reads a volume back, also from other programs, and [`volume_read::read_grid`] only
@@ -40,6 +41,7 @@ mod extension;
 mod numbers;
 mod open;
 pub mod read;
+pub mod textures;
 mod volume_format;
 pub mod volume_read;
 pub mod write;

@@ -18,7 +18,7 @@ fn write(path: &Path, volume: &Volume, options: &WriteOptions<'_>) {
     write_volume(path, volume, options).unwrap().commit().unwrap();
 }
 
-const SPARSE: WriteOptions<'static> = WriteOptions { up: UpAxis::Z, sparse: true, progress: None };
+const SPARSE: WriteOptions<'static> = WriteOptions { up: UpAxis::Z, sparse: true, described: None, progress: None };
 
 #[test]
 fn formats_with_a_grid_round_trip_exactly() {

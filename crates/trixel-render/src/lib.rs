@@ -4,4 +4,4 @@ mod picture;
 mod preview;
 
 pub use picture::{Picture, PictureError};
-pub use preview::{Background, PreviewError, PreviewOptions, render_preview};
+pub use preview::{Background, PreviewError, PreviewOptions, VoxelColor, render_colored_preview, render_preview};

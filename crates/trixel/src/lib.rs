@@ -31,6 +31,7 @@
 #[doc = include_str!("../../../README.md")]
 struct Readme;
 
+pub mod attributes;
 mod backend;
 #[cfg(any(test, feature = "conformance"))]
 pub mod conformance;
@@ -41,6 +42,8 @@ pub mod lattice;
 mod material;
 mod mesh;
 mod mode;
+pub mod octree;
+mod rank;
 pub mod scene;
 mod topology;
 mod volume;
@@ -52,5 +55,6 @@ pub use job::{Job, JobError, Strategy};
 pub use material::{AlphaMode, Filter, Image, ImageSource, Material, Texture, TextureRef, Wrap};
 pub use mesh::{Attribute, Bounds, Mesh, MeshError, UpAxis};
 pub use mode::Mode;
+pub use rank::{Rank, VoxelOrder, morton, voxel_list};
 pub use topology::Topology;
 pub use volume::{Bytes, Volume, VolumeError, WORD_BITS, set_bits};

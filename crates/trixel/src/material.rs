@@ -95,6 +95,8 @@ pub struct Texture {
     pub wrap: [Wrap; 2],
     /// How texels are combined.
     pub filter: Filter,
+    /// Whether a texture that is finer than the voxels is averaged first, as samplers with mipmaps do.
+    pub mipmaps: bool,
 }
 
 /// What a sampler does outside [0, 1].

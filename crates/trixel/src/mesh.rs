@@ -71,15 +71,51 @@ impl<T: Copy> Attribute<T> {
         Self { values, corners: None }
     }
 
+    /// The values of two meshes one after the other, each mesh given by its number of vertices and its triangles. A mesh
+    /// without values has corners without.
+    fn joined(both: [Option<Self>; 2], [first, second]: [(usize, &[[u32; 3]]); 2]) -> Option<Self> {
+        let [a, b] = match both {
+            [None, None] => return None,
+            [a, b] => [a, b].map(|part| part.unwrap_or(Self { values: Vec::new(), corners: Some(Vec::new()) })),
+        };
+        let mut values = a.values;
+        let offset = values.len();
+        if a.corners.is_none() && b.corners.is_none() && offset == first.0 {
+            values.extend(b.values);
+            return Some(Self::per_vertex(values));
+        }
+        // Corners that lead nowhere must not come to lead into the other mesh's values.
+        let explicit = |part: Option<Vec<[u32; 3]>>, triangles: &[[u32; 3]], count: usize, offset: usize| {
+            let mut corners = part.unwrap_or_else(|| triangles.to_vec());
+            corners.resize(triangles.len(), [Self::NONE; 3]);
+            let shifted = |corner: u32| {
+                let inside = usize::try_from(corner).ok().filter(|&corner| corner < count);
+                inside.and_then(|corner| u32::try_from(corner + offset).ok()).unwrap_or(Self::NONE)
+            };
+            corners.into_iter().map(move |corners| corners.map(shifted)).collect::<Vec<_>>()
+        };
+        let mut corners = explicit(a.corners, first.1, offset, 0);
+        corners.extend(explicit(b.corners, second.1, b.values.len(), offset));
+        values.extend(b.values);
+        Some(Self { values, corners: Some(corners) })
+    }
+
     /// The values on the corners of triangle `triangle`, whose vertices are `vertices`; `None` where one is missing.
     #[must_use]
     pub fn on_triangle(&self, triangle: usize, vertices: [u32; 3]) -> Option<[T; 3]> {
-        let corners = match &self.corners {
-            None => vertices,
-            Some(corners) => *corners.get(triangle)?,
-        };
+        let corners = self.corners_of(triangle, vertices)?;
         let value = |corner: u32| self.values.get(corner as usize).copied();
         Some([value(corners[0])?, value(corners[1])?, value(corners[2])?])
+    }
+
+    /// The indices into `values` of the corners of triangle `triangle`, whose vertices are `vertices`; they may be
+    /// [`Attribute::NONE`] or out of range.
+    #[must_use]
+    pub fn corners_of(&self, triangle: usize, vertices: [u32; 3]) -> Option<[u32; 3]> {
+        match &self.corners {
+            None => Some(vertices),
+            Some(corners) => corners.get(triangle).copied(),
+        }
     }
 }
 
@@ -139,6 +175,72 @@ impl Mesh {
         Self { positions, triangles, ..Self::default() }
     }
 
+    /// Adds the triangles of another mesh, with all that lies on them and their materials, which keep their order behind
+    /// those that are there: so several meshes share one grid. Give each mesh materials of its own to tell them apart, and
+    /// [`crate::attributes::AttributeRequest::with_priorities`] to say which wins where they overlap.
+    ///
+    /// # Errors
+    /// When there would be more vertices than 32 bits can name; the mesh is then as it was.
+    ///
+    /// ```
+    /// use trixel::{Material, Mesh};
+    /// let mut scene = trixel::scene::build("cube")?;
+    /// let mut other = scene.clone();
+    /// other.materials = vec![Material::default()];
+    /// other.triangle_materials = vec![0; other.triangles.len()];
+    /// scene.append(other)?;
+    /// assert_eq!(scene.triangle_materials[0], Mesh::NO_MATERIAL);
+    /// assert_eq!(scene.triangle_materials[scene.triangles.len() - 1], 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn append(&mut self, other: Self) -> Result<(), MeshError> {
+        let vertices = self.positions.len() + other.positions.len();
+        let (Ok(offset), Ok(_)) = (u32::try_from(self.positions.len()), u32::try_from(vertices)) else {
+            return Err(MeshError::TooManyVertices(vertices));
+        };
+        let parts = [(self.positions.len(), self.triangles.as_slice()), (other.positions.len(), &other.triangles)];
+        self.normals = Attribute::joined([self.normals.take(), other.normals], parts);
+        self.colors = Attribute::joined([self.colors.take(), other.colors], parts);
+        let mut sets = other.uvs.into_iter();
+        let count = self.uvs.len().max(sets.len());
+        let mut own = std::mem::take(&mut self.uvs).into_iter();
+        self.uvs = (0..count).filter_map(|_| Attribute::joined([own.next(), sets.next()], parts)).collect();
+
+        // Counts of materials, textures and images are far below 2^32: each has a place in memory of many bytes.
+        let narrow = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+        let (materials, textures, images) =
+            (narrow(self.materials.len()), narrow(self.textures.len()), narrow(self.images.len()));
+        if !self.triangle_materials.is_empty() || !other.triangle_materials.is_empty() {
+            self.triangle_materials.resize(self.triangles.len(), Self::NO_MATERIAL);
+            let shifted = |material: u32| {
+                if material == Self::NO_MATERIAL { material } else { material.saturating_add(materials) }
+            };
+            self.triangle_materials.extend(other.triangle_materials.into_iter().map(shifted));
+            self.triangle_materials.resize(self.triangles.len() + other.triangles.len(), Self::NO_MATERIAL);
+        }
+        self.materials.extend(other.materials.into_iter().map(|mut material| {
+            for used in [
+                &mut material.base_color_texture,
+                &mut material.metallic_roughness_texture,
+                &mut material.emissive_texture,
+                &mut material.opacity_texture,
+            ] {
+                used.iter_mut().for_each(|used| used.texture = used.texture.saturating_add(textures));
+            }
+            material
+        }));
+        self.textures.extend(
+            other
+                .textures
+                .into_iter()
+                .map(|texture| Texture { image: texture.image.saturating_add(images), ..texture }),
+        );
+        self.images.extend(other.images);
+        self.positions.extend(other.positions);
+        self.triangles.extend(other.triangles.into_iter().map(|corners| corners.map(|v| v.saturating_add(offset))));
+        Ok(())
+    }
+
     /// Checks that every index is in range and every position that a triangle uses is finite.
     ///
     /// # Errors
@@ -173,5 +275,66 @@ impl Mesh {
             }
         }
         (!self.triangles.is_empty()).then_some(bounds)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::TextureRef;
+
+    fn triangle(shift: f32) -> Mesh {
+        let x = f64::from(shift);
+        Mesh::new(vec![[x, 0.0, 0.0], [x, 1.0, 0.0], [x, 0.0, 1.0], [x, 9.0, 9.0]], vec![[0, 1, 2]])
+    }
+
+    #[test]
+    fn what_lies_on_triangles_follows_them() {
+        let values = |shift: f32| [0.0, 1.0, 2.0, 3.0].map(|v| [v + shift, 0.0]).to_vec();
+        let per_vertex = |shift| Attribute::per_vertex(values(shift));
+        let corners = |shift| Attribute { values: values(shift), corners: Some(vec![[3, 2, u32::MAX - 7]]) };
+        let with_corners = |shift| Attribute { values: values(shift), corners: Some(vec![[3, 2, 1]]) };
+        let kinds = |shift| [None, Some(per_vertex(shift)), Some(with_corners(shift))];
+        for a in kinds(0.0) {
+            for b in kinds(10.0) {
+                let (mut mesh, mut other) = (triangle(0.0), triangle(5.0));
+                (mesh.uvs, other.uvs) = (a.clone().into_iter().collect(), b.into_iter().collect());
+                let expected =
+                    [&mesh, &other].map(|mesh| mesh.uvs.first().and_then(|uvs| uvs.on_triangle(0, [0, 1, 2])));
+                mesh.append(other).unwrap();
+                assert_eq!(mesh.triangles, [[0, 1, 2], [4, 5, 6]]);
+                let found = [0, 1].map(|i| mesh.uvs.first().and_then(|uvs| uvs.on_triangle(i, mesh.triangles[i])));
+                assert_eq!(found, expected);
+            }
+        }
+        // Corners that lead nowhere still do.
+        let (mut mesh, mut other) = (triangle(0.0), triangle(5.0));
+        (mesh.uvs, other.uvs) = (vec![per_vertex(0.0)], vec![corners(10.0)]);
+        mesh.append(other).unwrap();
+        assert_eq!(mesh.uvs[0].on_triangle(1, [4, 5, 6]), None);
+    }
+
+    #[test]
+    fn materials_keep_their_textures() {
+        let with = |name: &str| {
+            let mut mesh = triangle(0.0);
+            let texture = Some(TextureRef::new(0));
+            mesh.materials = vec![Material { name: name.into(), emissive_texture: texture, ..Material::default() }];
+            mesh.triangle_materials = vec![0];
+            let source = crate::material::ImageSource::File(name.into());
+            mesh.images = vec![Image { name: name.into(), source }];
+            let (wrap, filter) = Default::default();
+            mesh.textures = vec![Texture { image: 0, wrap, filter, mipmaps: true }];
+            mesh
+        };
+        let mut mesh = triangle(1.0);
+        mesh.append(with("a")).unwrap();
+        mesh.append(with("b")).unwrap();
+        mesh.append(triangle(2.0)).unwrap();
+        assert_eq!(mesh.triangle_materials, [Mesh::NO_MATERIAL, 0, 1, Mesh::NO_MATERIAL]);
+        for (material, name) in mesh.materials.iter().zip(["a", "b"]) {
+            let texture = mesh.textures[material.emissive_texture.unwrap().texture as usize];
+            assert_eq!(mesh.images[texture.image as usize].name, name);
+        }
     }
 }

@@ -68,7 +68,7 @@ fn srgb_to_linear(c: f32) -> f32 {
 }
 
 /// The linear colour of an sRGB one, from 0 to 1; alpha is linear always.
-pub(super) fn linear([r, g, b, a]: [f32; 4]) -> [f32; 4] {
+pub(crate) fn linear([r, g, b, a]: [f32; 4]) -> [f32; 4] {
     [srgb_to_linear(r), srgb_to_linear(g), srgb_to_linear(b), a]
 }
 

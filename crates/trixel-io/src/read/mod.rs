@@ -18,7 +18,7 @@
 
 mod assemble;
 mod collada;
-mod color;
+pub(crate) mod color;
 mod directory;
 mod gltf;
 mod instances;

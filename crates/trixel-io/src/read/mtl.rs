@@ -82,7 +82,7 @@ impl Materials {
         let (options, file) = split_options(line);
         let Some(image) = self.image(file, resources) else { return };
         let wrap = [if options.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2];
-        let texture = Texture { image, wrap, filter: Filter::default() };
+        let texture = Texture { image, wrap, filter: Filter::default(), mipmaps: true };
         let index = u32::try_from(self.textures.len()).unwrap_or(u32::MAX);
         self.textures.push(texture);
         // OBJ scales and moves with v up: v' = 1 - (scale (1 - v) + offset).

@@ -532,7 +532,12 @@ fn add_textures(mesh: &mut Mesh, names: &[String], resources: &dyn Resources, wa
             Some(path) => {
                 let image = u32::try_from(mesh.images.len()).unwrap_or(u32::MAX);
                 mesh.images.push(Image { name: name.clone(), source: ImageSource::File(path) });
-                mesh.textures.push(Texture { image, wrap: Default::default(), filter: Default::default() });
+                mesh.textures.push(Texture {
+                    image,
+                    wrap: Default::default(),
+                    filter: Default::default(),
+                    mipmaps: true,
+                });
                 material.base_color_texture = Some(TextureRef::new(image));
             }
             None => missing.push(name.clone()),

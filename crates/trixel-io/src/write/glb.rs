@@ -13,8 +13,10 @@ use trixel::{Grid, UpAxis, Volume};
 use super::surface::IndexedSurface;
 use super::{Failure, WriteOptions};
 use crate::numbers::narrow;
+use crate::read::color;
 
 const UNSIGNED_INT: u32 = 5125;
+const UNSIGNED_SHORT: u32 = 5123;
 const FLOAT: u32 = 5126;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
@@ -45,6 +47,8 @@ pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl 
     let position = |vertex: &[u32; 3]| -> [f32; 3] { std::array::from_fn(|i| coordinates[i][vertex[i] as usize]) };
     let position_bytes = surface.vertices.len() as u64 * 12;
     let index_bytes = surface.quads.len() as u64 * 24;
+    let color_bytes = surface.colors.as_ref().map_or(0, |colors| colors.len() as u64 * 8);
+    let binary_bytes = position_bytes + index_bytes + color_bytes;
     let mut document = json!({
         "asset": { "version": "2.0", "generator": concat!("trixel ", env!("CARGO_PKG_VERSION")) },
         "scene": 0,
@@ -88,10 +92,13 @@ pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl 
             { "buffer": 0, "byteOffset": 0, "byteLength": position_bytes, "target": ARRAY_BUFFER },
             { "buffer": 0, "byteOffset": position_bytes, "byteLength": index_bytes, "target": ELEMENT_ARRAY_BUFFER },
         ]);
-        document["buffers"] = json!([{ "byteLength": position_bytes + index_bytes }]);
+        document["buffers"] = json!([{ "byteLength": binary_bytes }]);
+        if surface.colors.is_some() {
+            add_colors(&mut document, surface.vertices.len(), position_bytes + index_bytes, color_bytes);
+        }
     }
     let mut out = BufWriter::new(out);
-    write_headers(&document, position_bytes + index_bytes, &mut out)?;
+    write_headers(&document, binary_bytes, &mut out)?;
     for vertex in &surface.vertices {
         for value in position(vertex) {
             out.write_all(&value.to_le_bytes())?;
@@ -103,7 +110,37 @@ pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl 
             out.write_all(&index.to_le_bytes())?;
         }
     }
+    for color in surface.colors.iter().flatten() {
+        for value in linear16(*color) {
+            out.write_all(&value.to_le_bytes())?;
+        }
+    }
     Ok(out.flush()?)
+}
+
+/// Declares linear colours of 16 bits (glTF 2.0, section 3.7.2.1) behind positions and indices.
+fn add_colors(document: &mut Value, count: usize, offset: u64, bytes: u64) {
+    document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(2);
+    document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([1.0, 1.0, 1.0, 1.0]);
+    if let Some(accessors) = document["accessors"].as_array_mut() {
+        accessors.push(json!({
+            "bufferView": 2, "componentType": UNSIGNED_SHORT, "normalized": true, "type": "VEC4", "count": count,
+        }));
+    }
+    if let Some(views) = document["bufferViews"].as_array_mut() {
+        views.push(json!({ "buffer": 0, "byteOffset": offset, "byteLength": bytes, "target": ARRAY_BUFFER }));
+    }
+}
+
+/// The linear colour of an sRGB one; alpha is linear already.
+fn linear16([r, g, b, a]: [u8; 4]) -> [u16; 4] {
+    let linear = |byte: u8| {
+        let [value, ..] = color::linear([f32::from(byte) / 255.0; 4]);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 65535")]
+        let value = (value * 65535.0).round() as u16;
+        value
+    };
+    [linear(r), linear(g), linear(b), u16::from(a) * 257]
 }
 
 /// Writes the file header, the JSON chunk and the head of the binary chunk of `binary_bytes` (a multiple of 4).

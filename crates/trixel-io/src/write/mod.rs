@@ -5,18 +5,20 @@
 //!
 //! | format | voxels | where the grid is |
 //! |---|---|---|
-//! | `.npz` | `occupancy[x, y, z]` or `indices` | arrays `origin`, `voxel_size` |
+//! | `.npz` | `occupancy[x, y, z]` or `indices`; attributes | arrays `origin`, `voxel_size` |
 //! | `.npy` | `[x, y, z]` | not in the file |
 //! | `.binvox` | padded to a cube at the high ends | `translate`, `scale` |
-//! | `.vox` | one colour, z up, centred | attributes of the root node; the editor knows only whole voxels |
-//! | `.vti` | cell data `occupancy` | `Origin`, `Spacing` |
+//! | `.vox` | one colour, or at most 255, z up, centred | attributes of the root node; the editor knows only whole voxels |
+//! | `.vti` | cell data `occupancy`, and attributes | `Origin`, `Spacing` |
 //! | `.nrrd` | x fastest | `space origin` (centre of the first voxel), `space directions` |
-//! | `.obj`, `.ply` | exposed faces in mesh coordinates, f64 | the coordinates, and comments |
+//! | `.obj`, `.ply` | exposed faces, coloured, in mesh coordinates, f64 | the coordinates, and comments |
 //! | `.stl` | exposed faces in mesh coordinates, f32 | the coordinates |
-//! | `.glb` | exposed faces from the grid's origin, f32 | the node's matrix (y up), and `extras` |
+//! | `.glb` | exposed faces, coloured, from the grid's origin, f32 | the node's matrix (y up), and `extras` |
 //! | `.raw` | `[x, y, z]`, one byte each | `.json` file beside it |
 
 mod binvox;
+mod colored;
+mod columns;
 mod deflate;
 mod dense;
 mod glb;
@@ -25,6 +27,7 @@ mod npy_header;
 mod npz;
 mod nrrd;
 mod obj;
+mod palette;
 mod ply;
 mod raw;
 mod stl;
@@ -36,6 +39,7 @@ mod x_fastest;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use trixel::attributes::Described;
 use trixel::{Grid, UpAxis, Volume};
 
 pub use crate::atomic_file::{CommitError, Staged};
@@ -52,13 +56,16 @@ pub struct WriteOptions<'a> {
     pub up: UpAxis,
     /// Write `.npz` as a list of the set voxels instead of a dense array.
     pub sparse: bool,
+    /// What is in the voxels, for the formats that can tell: `.npz` and `.vti` write every attribute; `.vox`, `.ply`,
+    /// `.obj` and `.glb` show colours, and like `.stl` leave out what the alpha test cut out.
+    pub described: Option<Described<'a>>,
     /// Called now and then, from the calling thread, with the fraction that is done.
     pub progress: Option<&'a dyn Fn(f32)>,
 }
 
 impl Default for WriteOptions<'_> {
     fn default() -> Self {
-        Self { up: UpAxis::Z, sparse: false, progress: None }
+        Self { up: UpAxis::Z, sparse: false, described: None, progress: None }
     }
 }
 
@@ -183,6 +190,14 @@ pub fn write_volume(path: &Path, volume: &Volume, options: &WriteOptions<'_>) ->
     check_limits(format, volume.grid()).map_err(|problem| Failure::Limit(problem).at(path))?;
     let mut file = open(path)?;
     let out = &mut file;
+    let shown = match (format, options.described) {
+        (
+            VolumeFormat::Vox | VolumeFormat::Obj | VolumeFormat::Ply | VolumeFormat::Stl | VolumeFormat::Glb,
+            Some(described),
+        ) => described.without_cut_out().map_err(|error| Failure::Limit(error.to_string()).at(path))?,
+        _ => None,
+    };
+    let volume = shown.as_ref().unwrap_or(volume);
     match format {
         VolumeFormat::Npz => npz::write(volume, options, out).map_err(Failure::Io),
         VolumeFormat::Npy => dense::write_npy(volume, options, out).map_err(Failure::Io),

@@ -8,11 +8,11 @@ use std::io::{self, Seek, SeekFrom, Write};
 
 use trixel::{Volume, set_bits};
 
-use super::WriteOptions;
 use super::deflate::{Fill, Stream};
 use super::dense::DenseBlocks;
 use super::little_endian::{put16, put32, put64};
 use super::npy_header::npy_header;
+use super::{WriteOptions, columns};
 
 /// The time stamp of every entry, the earliest there is (1980-01-01), so that equal volumes give equal files.
 const DOS_DATE: u16 = 1 << 5 | 1;
@@ -218,7 +218,7 @@ fn saturate(value: u64) -> u32 {
 }
 
 /// Writes `occupancy` (bool, `[x, y, z]`), `origin` and `voxel_size` (f64[3]); or, sparse, `indices` (i32, N x 3, sorted
-/// by x, y, z) and `dims` (i32[3]) in place of `occupancy`.
+/// by x, y, z) and `dims` (i32[3]) in place of `occupancy`. Attributes follow under their names.
 pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut (impl Write + Seek)) -> io::Result<()> {
     let grid = volume.grid();
     let mut npz = NpzWriter::new(out);
@@ -234,6 +234,9 @@ pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut (impl
         let mut progress = |done| options.report(done as u64, blocks.count() as u64);
         let fill = |index, out: &mut Vec<u8>| blocks.fill(index, out);
         npz.array("occupancy", "|b1", &grid.dims().map(u64::from), blocks.count(), &fill, &mut progress)?;
+    }
+    if let Some(described) = options.described {
+        columns::write(&described, options.sparse, &mut npz)?;
     }
     npz.floats("origin", &grid.origin())?;
     npz.floats("voxel_size", &grid.voxel_size())?;

@@ -1,4 +1,5 @@
-//! The exposed faces as binary little-endian PLY: quadrilaterals with shared vertices, in mesh coordinates (`double`).
+//! The exposed faces as binary little-endian PLY: quadrilaterals with shared vertices, in mesh coordinates (`double`);
+//! colours on the vertices where there are any.
 
 use std::io::{BufWriter, Write};
 
@@ -7,6 +8,9 @@ use trixel::Volume;
 use super::surface::{IndexedSurface, coordinates};
 use super::{Failure, WriteOptions};
 use crate::numbers::spaced;
+
+/// sRGB colours, as programs take them.
+const COLOR_PROPERTIES: &str = "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n";
 
 /// Writes the surface of `volume`; comments hold the grid.
 pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl Write) -> Result<(), Failure> {
@@ -26,16 +30,22 @@ pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl 
          property double x\n\
          property double y\n\
          property double z\n\
+         {}\
          element face {}\n\
          property list uchar uint vertex_indices\n\
          end_header\n",
         surface.vertices.len(),
+        if surface.colors.is_some() { COLOR_PROPERTIES } else { "" },
         surface.quads.len(),
     )?;
     let coordinates = coordinates(grid);
-    for vertex in &surface.vertices {
+    let colors = surface.colors.as_deref().unwrap_or_default();
+    for (index, vertex) in surface.vertices.iter().enumerate() {
         for (axis, &at) in coordinates.iter().zip(vertex) {
             out.write_all(&axis[at as usize].to_le_bytes())?;
+        }
+        if let Some(color) = colors.get(index) {
+            out.write_all(color)?;
         }
     }
     options.report(5, 6);

@@ -8,8 +8,10 @@
 //! Faces are found 64 at a time from the volume's words. Memory is in proportion to the surface.
 
 use rayon::prelude::*;
+use trixel::attributes::Described;
 use trixel::{Grid, Volume};
 
+use super::colored::colored_rectangles;
 use super::{Failure, WriteOptions};
 use crate::bits::{WORD, transpose, words_for};
 
@@ -224,6 +226,8 @@ pub(super) struct IndexedSurface {
     pub(super) vertices: Vec<[u32; 3]>,
     /// Indices of the corners of each rectangle, counter-clockwise seen from outside.
     pub(super) quads: Vec<[u32; 4]>,
+    /// The corners' colours, sRGB and alpha, where there are any; corners are then shared by one colour only.
+    pub(super) colors: Option<Vec<[u8; 4]>>,
 }
 
 /// Bits of a corner's coordinate, which goes up to [`trixel::Grid::MAX_DIM`] inclusive.
@@ -235,38 +239,52 @@ impl IndexedSurface {
     /// # Errors
     /// When there are more corners than 32 bits can number.
     pub(super) fn new(volume: &Volume, options: &WriteOptions<'_>) -> Result<Self, Failure> {
-        let rectangles = rectangles(volume, options);
+        let (rectangles, face_colors): (Vec<_>, Option<Vec<_>>) = match options.described.filter(Described::has_colors)
+        {
+            Some(described) => {
+                let colored = colored_rectangles(volume, &described, options);
+                let (rectangles, colors) = colored.into_iter().map(|face| (face.rectangle, face.color)).unzip();
+                (rectangles, Some(colors))
+            }
+            None => (rectangles(volume, options), None),
+        };
         let Ok(corner_count) = u32::try_from(rectangles.len() as u64 * 4) else {
             return Err(Failure::Limit(format!(
                 "the surface has {} rectangles, more than this format can index; choose a lower resolution or .stl",
                 rectangles.len()
             )));
         };
+        let color_of = |face: usize| {
+            face_colors.as_ref().and_then(|colors| colors.get(face)).map_or(0, |&color| u32::from_be_bytes(color))
+        };
         // Sorting corners by place and then numbering them costs less than hashing and gives one order always.
-        let mut corners: Vec<(u64, u32)> = rectangles
+        let mut corners: Vec<(u64, u32, u32)> = rectangles
             .iter()
             .flat_map(Rectangle::corners)
             .map(|[x, y, z]| u64::from(x) << (2 * KEY_BITS) | u64::from(y) << KEY_BITS | u64::from(z))
             .zip(0..corner_count)
+            .map(|(key, slot)| (key, color_of(slot as usize / 4), slot))
             .collect();
         corners.par_sort_unstable();
         let mut quads = vec![[0; 4]; rectangles.len()];
         let mut vertices: Vec<[u32; 3]> = Vec::new();
+        let mut colors = Vec::new();
         let mut previous = None;
         let mut index = 0;
-        for (key, slot) in corners {
-            if previous != Some(key) {
-                previous = Some(key);
+        for (key, color, slot) in corners {
+            if previous != Some((key, color)) {
+                previous = Some((key, color));
                 // Fewer than the corners, which fit.
                 index = u32::try_from(vertices.len()).unwrap_or(u32::MAX);
                 vertices.push([2, 1, 0].map(|axis: u32| {
                     u32::try_from(key >> (axis * KEY_BITS) & ((1 << KEY_BITS) - 1)).unwrap_or(u32::MAX)
                 }));
+                colors.push(color.to_be_bytes());
             }
             quads[slot as usize / 4][slot as usize % 4] = index;
         }
         options.report(4, 6);
-        Ok(Self { vertices, quads })
+        Ok(Self { vertices, quads, colors: face_colors.map(|_| colors) })
     }
 }
 

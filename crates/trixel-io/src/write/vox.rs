@@ -12,9 +12,11 @@
 use std::io::{self, Write};
 use std::ops::Range;
 
+use trixel::attributes::Described;
 use trixel::{Grid, UpAxis, Volume, WORD_BITS};
 
 use super::little_endian::put32;
+use super::palette::Palette;
 use super::{Failure, WriteOptions};
 use crate::numbers::spaced;
 
@@ -24,7 +26,8 @@ const MODEL_SIDE: u32 = 256;
 const WORLD_SIDE: u32 = 2000;
 /// Lengths are read as signed 32-bit numbers.
 const MAX_FILE_BYTES: u64 = i32::MAX as u64;
-/// Voxels name their colour by its number, from 1; this one is all that occupancy needs.
+/// Voxels name their colour by its number, from 1; this one is all that occupancy needs. Where voxels have colours, the
+/// palette holds them ([`Palette`]).
 const COLOR: u8 = 1;
 const LIGHT_GREY: [u8; 4] = [200, 200, 200, 255];
 
@@ -35,9 +38,16 @@ struct SceneAxis {
     reversed: bool,
 }
 
+/// The colours of the scene's voxels.
+struct Colors<'a> {
+    described: Described<'a>,
+    palette: Palette,
+}
+
 /// The volume as the editor shall see it.
 struct Scene<'a> {
     volume: &'a Volume,
+    colors: Option<Colors<'a>>,
     axes: [SceneAxis; 3],
 }
 
@@ -71,11 +81,13 @@ pub(super) fn check(grid: &Grid) -> Result<(), String> {
 
 /// Writes the volume, whose grid [`check`] has passed.
 pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl Write) -> Result<(), Failure> {
-    let scene = Scene { volume, axes: scene_axes(options.up) };
+    let colors = options.described.filter(Described::has_colors);
+    let colors = colors.map(|described| Colors { palette: Palette::new(volume, &described), described });
+    let scene = Scene { volume, colors, axes: scene_axes(options.up) };
     let parts = scene.parts();
     let graph = scene.graph(&parts);
     let models: u64 = parts.iter().map(Part::bytes).sum();
-    let palette = chunk(b"RGBA", &palette());
+    let palette = chunk(b"RGBA", &palette(scene.colors.as_ref()));
     let children = models + graph.len() as u64 + palette.len() as u64;
     if children > MAX_FILE_BYTES {
         let voxels: u64 = parts.iter().map(|part| part.voxels).sum();
@@ -186,6 +198,9 @@ impl Scene<'_> {
                     break;
                 }
                 *record = first.wrapping_add(step.wrapping_mul(rest.trailing_zeros())).to_le_bytes();
+                if let Some(Colors { described, palette }) = &self.colors {
+                    record[3] = palette.number(described.color([x, y, start + rest.trailing_zeros()]));
+                }
                 rest &= rest - 1;
                 length += record.len();
             }
@@ -254,10 +269,13 @@ fn transform(id: u32, attributes: &[(&str, String)], child: u32, layer: u32, at:
     chunk(b"nTRN", &content)
 }
 
-fn palette() -> Vec<u8> {
-    // Entry i is colour i + 1; all but the first are unused, and black.
+fn palette(colors: Option<&Colors<'_>>) -> Vec<u8> {
+    // Entry i is colour i + 1; those that are not used are black.
     let mut entries = [[0, 0, 0, 255]; 256];
-    entries[usize::from(COLOR) - 1] = LIGHT_GREY;
+    match colors {
+        Some(colors) => entries.iter_mut().zip(&colors.palette.entries).for_each(|(entry, color)| *entry = *color),
+        None => entries[usize::from(COLOR) - 1] = LIGHT_GREY,
+    }
     entries.as_flattened().to_vec()
 }
 

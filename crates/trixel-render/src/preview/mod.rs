@@ -40,7 +40,7 @@ pub struct PreviewOptions {
     pub background: Background,
     /// Whether the object stands on a ground that takes its shadow (never seen from below).
     pub ground: bool,
-    /// The object's colour, 8-bit sRGB.
+    /// The object's colour, 8-bit sRGB, where voxels have none of their own.
     pub color: [u8; 3],
     /// Whether the edges of voxels are drawn where voxels are large enough in the picture.
     pub voxel_edges: bool,
@@ -141,11 +141,43 @@ const BAND: u32 = 128;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn render_preview(volume: &Volume, options: &PreviewOptions) -> Result<Picture, PreviewError> {
+    render(volume, None, options)
+}
+
+/// The sRGB colour of a set voxel; `None` for [`PreviewOptions::color`].
+pub type VoxelColor<'a> = dyn Fn([u32; 3]) -> Option<[u8; 3]> + Sync + 'a;
+
+/// [`render_preview`] with a colour for each voxel.
+///
+/// # Errors
+/// When an option is out of range.
+///
+/// ```
+/// use trixel::{Grid, Volume};
+/// use trixel_render::{PreviewOptions, render_colored_preview};
+/// let mut volume = Volume::new(Grid::new([0.0; 3], [1.0; 3], [8, 8, 8])?)?;
+/// volume.set([1, 2, 3]);
+/// let options = PreviewOptions { size: [64, 48], ..PreviewOptions::default() };
+/// let picture = render_colored_preview(&volume, &|_| Some([200, 0, 0]), &options)?;
+/// let [red, green, ..] = picture.pixel(32, 24).ok_or("no pixel")?;
+/// assert!(red > 2 * green);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn render_colored_preview(
+    volume: &Volume,
+    colors: &VoxelColor<'_>,
+    options: &PreviewOptions,
+) -> Result<Picture, PreviewError> {
+    render(volume, Some(colors), options)
+}
+
+fn render(volume: &Volume, colors: Option<&VoxelColor<'_>>, options: &PreviewOptions) -> Result<Picture, PreviewError> {
     options.check()?;
     let [width, height] = options.size;
     let row_bytes = width as usize * 4;
     let mut rgba = vec![0; row_bytes * height as usize];
-    let scene = pyramid::Pyramid::build(volume).map(|pyramid| shade::Scene::new(volume.grid(), pyramid, options));
+    let scene =
+        pyramid::Pyramid::build(volume).map(|pyramid| shade::Scene::new(volume.grid(), pyramid, colors, options));
     let backdrop = resolve::Backdrop::new(options);
     for top in (0..height).step_by(BAND as usize) {
         let bottom = height.min(top + BAND);

@@ -7,9 +7,9 @@
 use glam::{DVec3, Vec3};
 use trixel::Grid;
 
-use super::PreviewOptions;
 use super::camera::{Camera, Frame, View};
 use super::pyramid::{Hit, Pyramid};
+use super::{PreviewOptions, VoxelColor};
 use crate::picture::linear_from_srgb;
 
 /// Edge, in pixels, of the tile after which ray directions repeat.
@@ -35,6 +35,8 @@ const RAYS: usize = 2;
 const SKY_REACH: f64 = 0.6;
 /// Voxels narrower than the first number of pixels are shaded by the smoothed normal, above the second by their faces.
 const SMOOTH_PIXELS: [f64; 2] = [2.0, 6.0];
+/// Neighbours whose linear colours differ by more than this get more samples.
+const COLOR_STEP: f32 = 0.02;
 /// Edges appear between these widths of a voxel in pixels.
 const EDGE_PIXELS: [f64; 2] = [5.0, 14.0];
 
@@ -49,6 +51,8 @@ pub(super) struct Pixel {
     pub position: Vec3,
     /// The normal there.
     pub normal: Vec3,
+    /// The colour there.
+    pub albedo: Vec3,
     /// Whether the edge of a voxel is drawn close by.
     pub detail: bool,
     /// Samples on the object.
@@ -93,6 +97,7 @@ pub(super) struct Scene<'a> {
     reach: f64,
     key: DVec3,
     albedo: Vec3,
+    colors: Option<&'a VoxelColor<'a>>,
     voxel_edges: bool,
     kernel: Kernel,
     /// Offsets within a pixel of the samples after the first, which is in the middle.
@@ -102,7 +107,12 @@ pub(super) struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    pub(super) fn new(grid: &Grid, pyramid: Pyramid<'a>, options: &PreviewOptions) -> Self {
+    pub(super) fn new(
+        grid: &Grid,
+        pyramid: Pyramid<'a>,
+        colors: Option<&'a VoxelColor<'a>>,
+        options: &PreviewOptions,
+    ) -> Self {
         let size = DVec3::from_array(grid.voxel_size());
         // Voxels a million times longer than wide would only lose the rays' precision.
         let voxel = (size / size.max_element()).max(DVec3::splat(1e-6));
@@ -131,6 +141,7 @@ impl<'a> Scene<'a> {
             reach: SKY_REACH * (high - low).max_element(),
             key: from_frame(frame, KEY_DIRECTION.normalize()),
             albedo: Vec3::from_array(options.color.map(linear_from_srgb)),
+            colors,
             voxel_edges: options.voxel_edges,
             kernel: Kernel::new(),
             offsets: (1..options.samples_per_pixel).map(sequence).collect(),
@@ -175,7 +186,12 @@ impl<'a> Scene<'a> {
             return true;
         }
         let apart = (neighbour.position - pixel.position).dot(pixel.normal).abs();
-        object && (pixel.detail || pixel.normal.dot(neighbour.normal) < 0.99 || apart > self.plane_tolerance())
+        let colors_differ = (pixel.albedo - neighbour.albedo).abs().max_element() > COLOR_STEP;
+        object
+            && (pixel.detail
+                || colors_differ
+                || pixel.normal.dot(neighbour.normal) < 0.99
+                || apart > self.plane_tolerance())
     }
 
     fn sample(&self, pixel: &mut Pixel, [x, y]: [f64; 2], share: f32, rays: Option<[[f64; 2]; RAYS]>) {
@@ -235,12 +251,21 @@ impl<'a> Scene<'a> {
         let half = (self.key - direction).normalize_or(normal).dot(normal).max(0.0);
         #[expect(clippy::cast_possible_truncation, reason = "at most 1")]
         let gloss = 0.06 * lit.sqrt() * half.powi(24) as f32;
-        pixel.sky += share * edge * ambient * self.albedo;
-        pixel.key += share * edge * KEY_COLOR * (self.albedo * lit + gloss);
+        let albedo = self.albedo(hit);
+        pixel.sky += share * edge * ambient * albedo;
+        pixel.key += share * edge * KEY_COLOR * (albedo * lit + gloss);
         if pixel.normal == Vec3::ZERO {
             pixel.position = position.as_vec3();
             pixel.normal = n;
+            pixel.albedo = albedo;
         }
+    }
+
+    /// The linear colour of the voxel that was hit.
+    fn albedo(&self, hit: &Hit) -> Vec3 {
+        let voxel = hit.voxel.map(|c| u32::try_from(c).unwrap_or(0));
+        let color = self.colors.and_then(|colors| colors(voxel));
+        color.map_or(self.albedo, |color| Vec3::from_array(color.map(linear_from_srgb)))
     }
 
     /// Darkens the rim of a voxel's face, by a line of about a pixel that fades as voxels get small.

@@ -5,14 +5,16 @@
 //! - `instructions`: the vector instructions they are compiled for
 //! - `setup`: what paths compute first
 //! - `rule`: the modes as thresholds
+//! - `fragments`: the voxels of each triangle by itself, for attributes
 //! - `number`: exact integers and floor lines
 //! - `sink`: runs into bits, toggles into parity
 //! - `slabs`: the grid cut along x, one piece a task, so that threads never share a word
 
+pub(crate) mod fragments;
 mod instructions;
 mod kernel;
 mod large;
-mod number;
+pub(crate) mod number;
 mod rows;
 mod rule;
 mod setup;

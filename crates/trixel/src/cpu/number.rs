@@ -5,7 +5,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 use crate::lattice::STEP_BITS;
 
 /// An integer wide enough for the triangles it is used on: `i64` up to [`SMALL_EXTENT`] voxels, `i128` above.
-pub(super) trait Int:
+pub(crate) trait Int:
     Copy + Ord + From<i64> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
     /// `floor(self / S)` with S the steps of a voxel.
@@ -18,7 +18,7 @@ pub(super) trait Int:
 /// 2^44. The plane's terms stay below 3 * 2^44 * 2^16 < 2^62, and the numerators of all divisions below
 /// 3 * 2^44 * 67 < 2^52. Both sides of a division are then below 2^53, and an f64 division rounded down or up is the exact
 /// floor or ceiling: a quotient a / b that is no integer is at least 1 / b away from one, more than half an ulp.
-pub(super) const SMALL_EXTENT: i64 = 63;
+pub(crate) const SMALL_EXTENT: i64 = 63;
 
 impl Int for i64 {
     #[inline(always)]

@@ -152,6 +152,7 @@ impl<'d> Materials<'d> {
             image,
             wrap: [wrap("wrap_s"), wrap("wrap_t")],
             filter: if setting("magfilter") == "NEAREST" { Filter::Nearest } else { Filter::Linear },
+            mipmaps: !matches!(setting("minfilter"), "NEAREST" | "LINEAR"),
         };
         let index = self.textures.iter().position(|known| *known == texture).unwrap_or_else(|| {
             self.textures.push(texture);

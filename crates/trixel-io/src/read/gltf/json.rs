@@ -326,6 +326,7 @@ pub(super) struct Image<'a> {
 #[serde(rename_all = "camelCase")]
 pub(super) struct Sampler {
     pub(super) mag_filter: Option<u32>,
+    pub(super) min_filter: Option<u32>,
     pub(super) wrap_s: Option<u32>,
     pub(super) wrap_t: Option<u32>,
 }

@@ -127,10 +127,18 @@ impl Reader<'_> {
             Some(33648) => Wrap::Mirror,
             _ => Wrap::Repeat,
         };
+        let nearest = sampler.and_then(|s| s.mag_filter) == Some(9728);
+        // Without a word on it the implementation chooses: averaging, unless all the rest is nearest.
+        let mipmaps = match sampler.and_then(|s| s.min_filter) {
+            Some(9728 | 9729) => false,
+            Some(_) => true,
+            None => !nearest,
+        };
         self.out.textures.push(Texture {
             image,
             wrap: [wrap(sampler.and_then(|s| s.wrap_s)), wrap(sampler.and_then(|s| s.wrap_t))],
-            filter: if sampler.and_then(|s| s.mag_filter) == Some(9728) { Filter::Nearest } else { Filter::Linear },
+            filter: if nearest { Filter::Nearest } else { Filter::Linear },
+            mipmaps,
         });
         u32::try_from(self.out.textures.len() - 1).ok()
     }

@@ -207,6 +207,7 @@ impl Properties<'_> {
                 image,
                 wrap: [wrap(&texture.tile[0]), wrap(&texture.tile[1])],
                 filter: if texture.nearest { Filter::Nearest } else { Filter::Linear },
+                mipmaps: !texture.nearest,
             });
             let index = u32::try_from(mesh.textures.len() - 1).ok();
             if let Some(material) = self.materials.get_mut(material) {
