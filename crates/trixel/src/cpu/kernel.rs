@@ -15,7 +15,7 @@ use fearless_simd::Simd;
 use super::number::SMALL_EXTENT;
 use super::rule::{Rule, SurfaceRule};
 use super::sink::Sink;
-use super::slabs::Selected;
+use super::triangles::Selected;
 use super::{large, rows, tiny};
 use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
 

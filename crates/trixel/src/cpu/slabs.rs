@@ -3,72 +3,21 @@
 //! With one thread there is one slab and no sorting. With more, triangles are first sorted into the slabs that they
 //! meet; slabs are cut so that each holds about the same work, and there are several a thread to level the rest.
 
-use fearless_simd::{Level, dispatch};
-
-use super::kernel::{self, VoxelBox};
-use super::rule::{Sliced, Solid, SurfaceRule};
-use super::sink::{SetRuns, Slab, ToggleRuns, prefix_xor};
-use crate::lattice::{LatticeMesh, LatticePositions};
+use super::kernel::VoxelBox;
+use super::painter::Painter;
+use super::sink::{Slab, prefix_xor};
+use super::triangles::Selected;
+use crate::lattice::LatticeMesh;
 use crate::volume::Volume;
 
-/// Some triangles of a mesh, one after the other.
-#[derive(Clone, Copy)]
-pub(super) struct Selected<'a> {
-    mesh: &'a LatticeMesh<'a>,
-    /// The triangles, or `None` for all.
-    indices: Option<&'a [u32]>,
-}
-
-impl Selected<'_> {
-    /// Calls `each` with the corners of every triangle.
-    #[inline(always)]
-    pub(super) fn for_each(&self, mut each: impl FnMut(&[[i64; 3]; 3])) {
-        let count = self.indices.map_or(self.mesh.triangles.len(), <[u32]>::len);
-        // One loop for both, because `each` is a whole kernel.
-        for i in 0..count {
-            let triangle = self.indices.map_or(i, |indices| indices[i] as usize);
-            each(&corners(self.mesh, self.mesh.triangles[triangle]));
-        }
-    }
-}
-
-/// The corners of a triangle.
-#[inline(always)]
-fn corners(mesh: &LatticeMesh<'_>, [a, b, c]: [u32; 3]) -> [[i64; 3]; 3] {
-    let corner = |vertex: u32| match &mesh.positions {
-        LatticePositions::Narrow(positions) => {
-            let [x, y, z] = positions[vertex as usize];
-            [i64::from(x), i64::from(y), i64::from(z)]
-        }
-        LatticePositions::Wide(positions) => positions[vertex as usize],
-    };
-    [corner(a), corner(b), corner(c)]
-}
-
-/// Clears the volume and sets the voxels of a surface mode.
-pub(super) fn surface<R: SurfaceRule>(level: Level, rule: &R, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
-    for_each_slab(mesh, volume, |slab, clip, triangles| {
-        let mut sink = SetRuns(slab);
-        dispatch!(level, simd => kernel::surface(simd, rule, Selected { mesh, indices: triangles }, clip, &mut sink));
-    });
-}
-
-/// Clears the volume and sets the voxels of [`crate::Mode::Sliced`].
-pub(super) fn slice(level: Level, rule: &Sliced, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
-    for_each_slab(mesh, volume, |slab, clip, triangles| {
-        let mut sink = SetRuns(slab);
-        dispatch!(level, simd => kernel::centres(simd, rule, Selected { mesh, indices: triangles }, clip, &mut sink));
-    });
-}
-
-/// Clears the volume and sets the voxels inside the mesh.
-pub(super) fn fill(level: Level, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
+/// Clears the volume and sets the voxels of the painter's mode.
+pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
     let nz = volume.grid().dims()[2];
-    for_each_slab(mesh, volume, |slab, clip, triangles| {
-        let column_words = slab.column_words;
-        let mut sink = ToggleRuns(slab);
-        dispatch!(level, simd => kernel::centres(simd, &Solid, Selected { mesh, indices: triangles }, clip, &mut sink));
-        prefix_xor(sink.0.words, column_words, nz);
+    for_each_slab(mesh, volume, |mut slab, clip, indices| {
+        painter.paint(Selected { mesh, indices }, clip, slab.reborrow());
+        if painter.toggles() {
+            prefix_xor(slab.words, slab.column_words, nz);
+        }
     });
 }
 
@@ -99,7 +48,7 @@ fn for_each_slab(
     let dims = volume.grid().dims();
     let (columns, column_words) = (dims[1] as usize, volume.column_words());
     volume.clear();
-    let slab = Slab { words: volume.words_mut(), x_start: 0, columns, column_words };
+    let slab = Slab { words: volume.words_mut(), start: [0; 3], columns, column_words };
     work(slab, &clip_of(dims, 0..dims[0]), None);
 }
 
@@ -107,7 +56,8 @@ fn for_each_slab(
 mod parallel {
     use rayon::prelude::*;
 
-    use super::{LatticeMesh, Slab, VoxelBox, clip_of, corners};
+    use super::{LatticeMesh, Slab, VoxelBox, clip_of};
+    use crate::cpu::triangles::corners;
     use crate::volume::Volume;
 
     /// Triangles sorted by one task.
@@ -171,7 +121,7 @@ mod parallel {
                 words.fill(0);
             }
             let clip = clip_of(dims, range.clone());
-            let slab = Slab { words, x_start: i64::from(range.start), columns, column_words };
+            let slab = Slab { words, start: [i64::from(range.start), 0, 0], columns, column_words };
             work(slab, &clip, Some(&list));
         });
     }
