@@ -2,7 +2,7 @@
 
 Usage: check_volumes.py FOLDER
 
-Each sub-folder of FOLDER holds one volume in every format, as `volume.EXTENSION` (and `sparse.npz`), with what is
+Each sub-folder of FOLDER holds one volume in every format, as `volume.EXTENSION` (and `sparse.npz`, `points.ply`), with what is
 expected beside them, made without trixel's writers: `expected.json` (grid, up axis, surface area and volume) and
 `expected.bin` (one byte a voxel, [x, y, z] in C order).
 """
@@ -166,6 +166,15 @@ def check_mesh(path, expected):
     check_surface(mesh, expected)
 
 
+def check_points(path, expected):
+    loaded = trimesh.load(path)
+    # A scene without anything in it where there are no points.
+    points = getattr(loaded, "vertices", np.zeros((0, 3)))
+    # argwhere sorts by x, y, z too.
+    centres = expected.origin + (np.argwhere(expected.occupancy) + 0.5) * expected.voxel_size
+    assert np.array_equal(points, centres)
+
+
 def check_glb(path, expected):
     # The scene, so that the node's transform counts; it turns up to y.
     scene = trimesh.load(path, force="scene")
@@ -196,6 +205,7 @@ def check_empty(path):
 CHECKS = {
     "volume.npz": check_npz,
     "sparse.npz": check_sparse,
+    "points.ply": check_points,
     "volume.npy": check_npy,
     "volume.raw": check_raw,
     "volume.binvox": check_binvox,

@@ -23,7 +23,7 @@ fn main() {
     let start = Instant::now();
     let lattice = LatticeMesh::snap(&mesh, job.grid()).unwrap();
     let snapped = start.elapsed();
-    let map = backend.voxelize_bricks(&lattice, &job).unwrap();
+    let map = backend.voxelize_bricks(&lattice, &job, None).unwrap();
     let done = start.elapsed();
     println!(
         "{name} {:?} {mode}, {threads} threads: snap {:.0} ms, all {:.0} ms; {} voxels in {} bricks, {}; peak {}",

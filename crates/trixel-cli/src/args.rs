@@ -91,7 +91,11 @@ pub(crate) struct VoxelizeArgs {
     #[arg(long, value_name = "N", default_value = "1", help_heading = "Output")]
     pub(crate) repeat: NonZeroU32,
 
-    /// Write .npz as a list of set voxels (`indices`) instead of a dense array.
+    /// Write .npz as a list of set voxels (`indices`) instead of a dense array, and .ply as a cloud of their centres
+    /// instead of faces.
+    ///
+    /// With .npz, .ply and .vox alone, memory then follows the surface instead of the grid; a grid that would not fit the
+    /// memory is written so without asking.
     #[arg(long, help_heading = "Output")]
     pub(crate) sparse: bool,
 

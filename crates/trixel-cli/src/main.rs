@@ -10,6 +10,7 @@ mod report;
 mod verify;
 mod volume;
 mod voxelize;
+mod voxels;
 
 use std::process::ExitCode;
 

@@ -16,15 +16,13 @@ use crate::args::{BackendArg, MethodArgs, VoxelizeArgs};
 use crate::grid::{GridRequest, usage};
 use crate::progress::Reporter;
 use crate::report::{GridReport, MeshReport, Report, Samples, Stages, median};
+use crate::voxels::Voxels;
 use crate::{memory, mesh, volume};
-
-/// Left free beside a dense grid, for the mesh, the writers and everybody else.
-const RESERVE_BYTES: u64 = 256 << 20;
 
 pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let start = Instant::now();
     let request = GridRequest::from_args(&args.grid, &mut args.input);
-    let Some(input) = args.input else { usage("INPUT is missing: a mesh file, or scene:NAME") };
+    let Some(input) = args.input.take() else { usage("INPUT is missing: a mesh file, or scene:NAME") };
     if args.outputs.is_empty() && args.report.is_none() {
         usage("nothing to write: give -o OUT (for example -o voxels.npz) or --report FILE.json");
     }
@@ -62,7 +60,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let lattice = lattice.with_context_of(&input)?;
     stages.snap = snap_ms;
 
-    let (voxels, allocate_ms) = reporter.stage("allocating", || allocate(&job));
+    let (voxels, allocate_ms) = reporter.stage("allocating", || Voxels::allocate(&args, &job));
     let mut voxels = voxels?;
     stages.allocate = allocate_ms;
 
@@ -70,7 +68,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let mut samples = Samples::default();
     let mut strategy = job.strategy();
     for _ in 0..args.repeat.get() {
-        let (used, ms) = reporter.stage("voxelizing", || backend.voxelize(&lattice, &job, &mut voxels));
+        let (used, ms) = reporter.stage("voxelizing", || voxels.voxelize(&backend, &lattice, &job));
         strategy = used?;
         samples.voxelize.push(ms);
     }
@@ -89,7 +87,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
         let (written, ms) = reporter.stage("writing", || -> Result<()> {
             for output in &args.outputs {
                 let options = WriteOptions { up, sparse: args.sparse, progress: Some(&|f| reporter.fraction(f)) };
-                staged = std::mem::take(&mut staged).join(volume::stage_output(output, &voxels, &options)?);
+                staged = std::mem::take(&mut staged).join(voxels.stage_output(output, &options)?);
             }
             Ok(())
         });
@@ -205,8 +203,7 @@ pub(crate) fn backend(backend: BackendArg) -> CpuBackend {
 
 /// An empty volume, if there is memory for it.
 pub(crate) fn allocate(job: &Job) -> Result<Volume> {
-    let available = memory::available().map(|bytes| bytes.saturating_sub(RESERVE_BYTES));
-    Ok(Volume::with_memory_limit(*job.grid(), available)?)
+    Ok(Volume::with_memory_limit(*job.grid(), memory::available_for_voxels())?)
 }
 
 /// Tells that a solid of an open mesh is not what its user may think.

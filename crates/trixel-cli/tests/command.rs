@@ -274,7 +274,7 @@ fn failures_exit_with_1_and_say_what_to_do() {
         ("voxelize t.obj -o t.obj", &["t.obj", "input"]),
         ("voxelize t.obj -o a.npz -o a.vox -r 3000", &["a.vox", "2000"]),
         ("voxelize t.obj -o a.binvox --voxel-size 1 2 3", &["a.binvox"]),
-        ("voxelize t.obj -o a.npz --dims 32768 32768 32768", &["4.0 TiB", "available", "resolution"]),
+        ("voxelize t.obj -o a.vti --dims 32768 32768 32768", &["4.0 TiB", "available", "resolution"]),
         ("voxelize t.obj -o a.npz --voxel-size 1e-9", &["32768"]),
         ("voxelize t.obj -o a.npz --like none.npz", &["none.npz"]),
         ("voxelize t.obj -o a.npz --like broken.npz", &["broken.npz"]),
@@ -322,4 +322,24 @@ fn help_and_completions_are_there() {
     }
     assert!(bench.ok("--version").stdout.contains(env!("CARGO_PKG_VERSION")));
     assert!(Path::new(env!("CARGO_BIN_EXE_trixel")).exists());
+}
+
+#[test]
+fn sparse_outputs_take_grids_far_beyond_the_memory() {
+    let bench = Bench::new();
+    // Dense, 4 TiB.
+    let huge = "voxelize scene:sphere:8 --dims 32768 32768 32768 --voxel-size 0.05 --origin -2 -3 -4";
+    bench.ok(&format!("{huge} -o huge.npz -o huge.ply --report huge.json"));
+    bench.ok("voxelize scene:sphere:8 --dims 70 90 110 --voxel-size 0.05 --origin -2 -3 -4 -o small.ply --sparse");
+    let centres = |name: &str| {
+        let bytes = std::fs::read(bench.path(name)).unwrap();
+        let end = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
+        bytes[end..].to_vec()
+    };
+    assert!(!centres("small.ply").is_empty());
+    assert!(centres("huge.ply") == centres("small.ply"));
+    bench.fails(1, &format!("{huge} -o huge.npz -o huge.vti"), &["huge.vti takes a dense grid", "4.0 TiB"]);
+    let report: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(bench.path("huge.json")).unwrap()).unwrap();
+    assert_eq!(report["voxels"].as_u64().unwrap() * 24, centres("huge.ply").len() as u64);
 }

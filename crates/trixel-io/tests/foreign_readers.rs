@@ -97,6 +97,7 @@ fn others_read_what_is_written() {
         }
         let sparse = WriteOptions { sparse: true, ..options };
         write_volume(&folder.join("sparse.npz"), volume, &sparse).unwrap().commit().unwrap();
+        write_volume(&folder.join("points.ply"), volume, &sparse).unwrap().commit().unwrap();
     }
     run("check_volumes.py", root.path());
 }

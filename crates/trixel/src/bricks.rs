@@ -198,12 +198,15 @@ impl Pillar {
         self.bars.is_empty()
     }
 
-    fn bytes(&self) -> usize {
-        size_of::<Self>()
-            + size_of_val(&*self.bars)
-            + size_of_val(&*self.heights)
-            + size_of_val(&*self.bricks)
-            + size_of_val(&*self.runs)
+    /// Bytes that it takes.
+    pub(crate) fn bytes(&self) -> u64 {
+        let lists = [
+            size_of_val(&*self.bars),
+            size_of_val(&*self.heights),
+            size_of_val(&*self.bricks),
+            size_of_val(&*self.runs),
+        ];
+        (size_of::<Self>() + lists.iter().sum::<usize>()) as u64
     }
 
     fn count(&self) -> u64 {
@@ -259,6 +262,12 @@ impl BrickMap {
         Self { grid, covered, pillars }
     }
 
+    /// A map without voxels.
+    #[must_use]
+    pub fn empty(grid: Grid) -> Self {
+        Self { grid, covered: [0..0, 0..0], pillars: Vec::new() }
+    }
+
     /// How many pillars a grid has along x and y: pieces of 64 x 64 columns, which are computed one by one.
     #[must_use]
     pub fn pillars_of(grid: &Grid) -> [u32; 2] {
@@ -293,7 +302,7 @@ impl BrickMap {
     /// Bytes that it takes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.pillars.iter().map(|pillar| pillar.bytes() as u64).sum()
+        self.pillars.iter().map(Pillar::bytes).sum()
     }
 
     /// The same voxels, dense.

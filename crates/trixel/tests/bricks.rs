@@ -24,7 +24,7 @@ impl Backend for ThroughBricks {
         if volume.grid() != job.grid() {
             return Err(Error::GridMismatch);
         }
-        let map = self.0.voxelize_bricks(mesh, job)?;
+        let map = self.0.voxelize_bricks(mesh, job, None)?;
         *volume = map.to_volume(None)?;
         assert_eq!(map.count(), volume.count());
         Ok(Strategy::ColumnRuns)
@@ -41,7 +41,7 @@ fn unit_grid(dims: [u32; 3]) -> Grid {
 
 fn bricks(mesh: &Mesh, job: &Job) -> BrickMap {
     let lattice = LatticeMesh::snap(mesh, job.grid()).unwrap();
-    CpuBackend::default().voxelize_bricks(&lattice, job).unwrap()
+    CpuBackend::default().voxelize_bricks(&lattice, job, None).unwrap()
 }
 
 /// Triangles from less than a voxel to far larger than the grid, over several pillars and tiles.
@@ -127,7 +127,7 @@ fn pieces_make_the_whole_for_any_number_of_threads() {
         let job = Job::new(unit_grid([300, 200, 250]), mode);
         let whole = bricks(&mesh, &job);
         let lattice = LatticeMesh::snap(&mesh, job.grid()).unwrap();
-        assert!(CpuBackend::with_threads(1).unwrap().voxelize_bricks(&lattice, &job).unwrap() == whole);
+        assert!(CpuBackend::with_threads(1).unwrap().voxelize_bricks(&lattice, &job, None).unwrap() == whole);
         let [px, py] = BrickMap::pillars_of(job.grid());
         assert_eq!([px, py], [5, 4]);
         let mut count = 0;
@@ -161,4 +161,17 @@ fn memory_follows_the_surface_also_of_a_solid() {
         // Four times, not eight.
         assert!(fine < 5 * coarse, "{mode}: {coarse} to {fine}");
     }
+}
+
+#[test]
+fn a_memory_limit_is_kept() {
+    let mesh = zoo::octahedron([50.5; 3], 48.0);
+    let job = Job::new(unit_grid([101; 3]), Mode::Conservative);
+    let lattice = LatticeMesh::snap(&mesh, job.grid()).unwrap();
+    let backend = CpuBackend::default();
+    let map = backend.voxelize_bricks(&lattice, &job, None).unwrap();
+    let needed = map.bytes() + backend.bin(&lattice, &job, 0..2).unwrap().bytes();
+    assert!(backend.voxelize_bricks(&lattice, &job, Some(needed)).unwrap() == map);
+    let error = backend.voxelize_bricks(&lattice, &job, Some(needed / 2)).unwrap_err().to_string();
+    assert!(error.contains("even as bricks"), "{error}");
 }

@@ -27,6 +27,7 @@ mod nrrd;
 mod obj;
 mod ply;
 mod raw;
+mod sparse_blocks;
 mod stl;
 mod surface;
 mod vox;
@@ -36,7 +37,7 @@ mod x_fastest;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use trixel::{Grid, UpAxis, Volume};
+use trixel::{BrickMap, Grid, Occupancy, UpAxis, Volume};
 
 pub use crate::atomic_file::{CommitError, Staged};
 pub use crate::volume_format::VolumeFormat;
@@ -50,7 +51,8 @@ use crate::extension;
 pub struct WriteOptions<'a> {
     /// The axis of the mesh that points up: `.vox` files are turned so that it is z, `.glb` files so that it is y.
     pub up: UpAxis,
-    /// Write `.npz` as a list of the set voxels instead of a dense array.
+    /// Write `.npz` as a list of the set voxels instead of a dense array, and `.ply` as points at their centres instead of
+    /// faces.
     pub sparse: bool,
     /// Called now and then, from the calling thread, with the fraction that is done.
     pub progress: Option<&'a dyn Fn(f32)>,
@@ -184,6 +186,7 @@ pub fn write_volume(path: &Path, volume: &Volume, options: &WriteOptions<'_>) ->
     let mut file = open(path)?;
     let out = &mut file;
     match format {
+        _ if options.sparse && format.takes_bricks() => write_voxels(format, volume, options, out),
         VolumeFormat::Npz => npz::write(volume, options, out).map_err(Failure::Io),
         VolumeFormat::Npy => dense::write_npy(volume, options, out).map_err(Failure::Io),
         VolumeFormat::Binvox => binvox::write(volume, options, out).map_err(Failure::Io),
@@ -206,6 +209,42 @@ pub fn write_volume(path: &Path, volume: &Volume, options: &WriteOptions<'_>) ->
     }
     options.report(1, 1);
     Ok(staged)
+}
+
+/// [`write_volume`] for bricks, in the formats that take them (see [`VolumeFormat::takes_bricks`]): `.npz` as `indices`,
+/// `.ply` as points, `.vox`.
+///
+/// # Errors
+/// As [`write_volume`]; other formats are refused.
+pub fn write_bricks(path: &Path, bricks: &BrickMap, options: &WriteOptions<'_>) -> Result<Staged, WriteError> {
+    let Some(format) = VolumeFormat::from_path(path) else {
+        return Err(WriteError::UnknownFormat { path: path.to_owned() });
+    };
+    check_limits(format, bricks.grid()).map_err(|problem| Failure::Limit(problem).at(path))?;
+    let mut file = open(path)?;
+    write_voxels(format, bricks, options, &mut file).map_err(|failure| failure.at(path))?;
+    options.report(1, 1);
+    stage(file, path)
+}
+
+/// Writes voxels that need not be dense.
+fn write_voxels(
+    format: VolumeFormat,
+    voxels: &impl Occupancy,
+    options: &WriteOptions<'_>,
+    out: &mut AtomicFile,
+) -> Result<(), Failure> {
+    match format {
+        VolumeFormat::Npz => npz::write_sparse(voxels, options, out).map_err(Failure::Io),
+        VolumeFormat::Ply => ply::write_points(voxels, options, out).map_err(Failure::Io),
+        VolumeFormat::Vox => vox::write(voxels, options, out),
+        _ => Err(Failure::Limit(format!(
+            ".{} files hold whole grids, and this grid is voxelized into bricks because it is too large or because \
+             of --sparse; write .{}",
+            format.extension(),
+            extension::list(VolumeFormat::ALL.into_iter().filter(|f| f.takes_bricks()).map(VolumeFormat::extension))
+        ))),
+    }
 }
 
 fn check_limits(format: VolumeFormat, grid: &Grid) -> Result<(), String> {

@@ -38,7 +38,7 @@ use crate::bricks::BrickMap;
 use crate::job::{Job, Strategy};
 use crate::lattice::LatticeMesh;
 use crate::mesh::MeshError;
-use crate::volume::Volume;
+use crate::volume::{Volume, VolumeError};
 
 /// Voxelizes on the CPU. The result is the same for any number of threads.
 #[derive(Debug, Default)]
@@ -88,29 +88,37 @@ impl CpuBackend {
     /// the memory. Memory and time follow the surface (mode `solid`: too, as the inside takes runs of whole bricks).
     ///
     /// # Errors
-    /// When the strategy is another backend's or the mesh has too many triangles.
+    /// When the strategy is another backend's, the mesh has too many triangles, or the bricks take more than `available`
+    /// bytes.
     ///
     /// ```
     /// use trixel::{CpuBackend, Grid, Job, Mode, lattice::LatticeMesh, scene};
     /// let mesh = scene::build("sphere:64")?;
     /// // Dense, this grid would take 64 GiB.
     /// let job = Job::new(Grid::fit(&mesh.bounds().ok_or("empty")?, 8192)?, Mode::Solid);
-    /// let map = CpuBackend::default().voxelize_bricks(&LatticeMesh::snap(&mesh, job.grid())?, &job)?;
+    /// let map = CpuBackend::default().voxelize_bricks(&LatticeMesh::snap(&mesh, job.grid())?, &job, None)?;
     /// assert!(map.get([4096; 3]) && !map.get([0; 3]));
     /// assert!(map.bytes() < 512 << 20);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn voxelize_bricks(&self, mesh: &LatticeMesh<'_>, job: &Job) -> Result<BrickMap, Error> {
-        let pillars = BrickMap::pillars_of(job.grid());
-        let binned = self.bin(mesh, job, 0..pillars[0])?;
-        Ok(self.install(|| binned.voxelize(0..pillars[0], 0..pillars[1])))
+    pub fn voxelize_bricks(
+        &self,
+        mesh: &LatticeMesh<'_>,
+        job: &Job,
+        available: Option<u64>,
+    ) -> Result<BrickMap, Error> {
+        let [px, py] = BrickMap::pillars_of(job.grid());
+        let binned = self.bin(mesh, job, 0..px)?;
+        let available = available.unwrap_or(u64::MAX).saturating_sub(binned.bytes());
+        let refused = VolumeError::Bricks { dims: job.grid().dims(), available };
+        Ok(self.install(|| binned.voxelize_within(0..px, 0..py, available)).ok_or(refused)?)
     }
 
     /// Sorts the triangles of `mesh`, which was snapped to the job's grid, into the pillars `[x, y]` with x in `layers`
     /// (see [`BrickMap::pillars_of`]), so that pillars can be voxelized piece by piece.
     ///
     /// # Errors
-    /// As [`CpuBackend::voxelize_bricks`].
+    /// As [`CpuBackend::voxelize_bricks`], memory aside.
     pub fn bin<'a>(&self, mesh: &'a LatticeMesh<'a>, job: &Job, layers: Range<u32>) -> Result<BinnedMesh<'a>, Error> {
         self.strategy(job)?;
         if u32::try_from(mesh.triangles.len()).is_err() {

@@ -5,6 +5,7 @@
 //! tile), with exact tests of large triangles against the tiles so that time follows the surface.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::kernel::VoxelBox;
 use super::painter::Painter;
@@ -84,15 +85,28 @@ impl<'a> BinnedMesh<'a> {
     /// The voxels of the pillars with the given x and y, of which x must have been among the `layers` that were binned.
     #[must_use]
     pub fn voxelize(&self, px: Range<u32>, py: Range<u32>) -> BrickMap {
+        let empty = BrickMap::empty(self.grid);
+        self.voxelize_within(px, py, u64::MAX).unwrap_or(empty)
+    }
+
+    /// [`Self::voxelize`]; `None` if the bricks take more than `available` bytes.
+    pub(super) fn voxelize_within(&self, px: Range<u32>, py: Range<u32>, available: u64) -> Option<BrickMap> {
         let [_, count_y] = BrickMap::pillars_of(&self.grid);
         let tasks: Vec<[u32; 2]> = px.clone().flat_map(|x| py.clone().map(move |y| [x, y])).collect();
+        // Whatever the order, the sum passes the limit or does not.
+        let taken = AtomicU64::new(0);
         let pillars = map_tasks(&tasks, Scratch::default, |scratch, &[x, y]| {
             let number = u64::from(x) * u64::from(count_y) + u64::from(y);
             let from = self.pairs.partition_point(|&pair| pair >> 32 < number);
             let length = self.pairs[from..].partition_point(|&pair| pair >> 32 == number);
-            self.pillar([x, y].map(i64::from), &self.pairs[from..from + length], scratch)
+            if taken.load(Ordering::Relaxed) > available {
+                return Pillar::default();
+            }
+            let pillar = self.pillar([x, y].map(i64::from), &self.pairs[from..from + length], scratch);
+            taken.fetch_add(pillar.bytes(), Ordering::Relaxed);
+            pillar
         });
-        BrickMap::new(self.grid, [px, py], pillars)
+        (taken.into_inner() <= available).then(|| BrickMap::new(self.grid, [px, py], pillars))
     }
 
     fn pillar(&self, at: [i64; 2], pairs: &[u64], scratch: &mut Scratch) -> Pillar {
@@ -314,7 +328,7 @@ impl Inside {
 
 /// Byte i is 255 where bit i of the lowest eight is set.
 fn spread_bits(bits: u64) -> u64 {
-    (0..8).fold(0, |word, i| word | (bits >> i & 1) * 0xff << (8 * i))
+    (0..8).fold(0, |word, i| word | ((bits >> i & 1) * 0xff) << (8 * i))
 }
 
 /// The columns of a pillar and one voxel around them, in lattice steps.
@@ -393,11 +407,10 @@ mod tests {
 
     #[test]
     fn bytes_transpose() {
-        let rows: [u64; 8] = std::array::from_fn(|i| u64::from_le_bytes(std::array::from_fn(|j| (8 * i + j) as u8)));
-        for (j, column) in transpose_bytes(&rows).iter().enumerate() {
-            for (i, byte) in column.to_le_bytes().into_iter().enumerate() {
-                assert_eq!(usize::from(byte), 8 * i + j);
-            }
+        let row = |first: u8| u64::from_le_bytes([0, 1, 2, 3, 4, 5, 6, 7].map(|j| first + j));
+        let rows = [0, 8, 16, 24, 32, 40, 48, 56].map(row);
+        for (j, column) in (0u8..).zip(transpose_bytes(&rows)) {
+            assert_eq!(column.to_le_bytes(), [0, 1, 2, 3, 4, 5, 6, 7].map(|i| 8 * i + j));
         }
     }
 }
