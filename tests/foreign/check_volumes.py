@@ -16,6 +16,7 @@ import nrrd
 import numpy as np
 import pyvista
 import trimesh
+import zarr
 from trimesh.exchange import binvox
 
 HERE = pathlib.Path(__file__).parent
@@ -57,6 +58,14 @@ def check_sparse(path, expected):
         occupancy = np.zeros(arrays["dims"], dtype=bool)
         occupancy[tuple(indices.T)] = True
         expected.check(occupancy, arrays["origin"], arrays["voxel_size"])
+
+
+def check_zarr(path, expected):
+    array = zarr.open_group(path, mode="r")["occupancy"]
+    assert array.dtype == bool and array.metadata.zarr_format == 3
+    assert array.metadata.dimension_names == ("x", "y", "z")
+    assert array.chunks == (64, 64, 64) and array.shards is not None
+    expected.check(array[:], array.attrs["origin"], array.attrs["voxel_size"])
 
 
 def check_npy(path, expected):
@@ -206,6 +215,7 @@ CHECKS = {
     "volume.npz": check_npz,
     "sparse.npz": check_sparse,
     "points.ply": check_points,
+    "volume.zarr": check_zarr,
     "volume.npy": check_npy,
     "volume.raw": check_raw,
     "volume.binvox": check_binvox,

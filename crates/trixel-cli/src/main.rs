@@ -5,6 +5,7 @@ mod grid;
 mod info;
 mod memory;
 mod mesh;
+mod out_of_core;
 mod progress;
 mod report;
 mod verify;

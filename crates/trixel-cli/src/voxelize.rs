@@ -17,7 +17,7 @@ use crate::grid::{GridRequest, usage};
 use crate::progress::Reporter;
 use crate::report::{GridReport, MeshReport, Report, Samples, Stages, median};
 use crate::voxels::Voxels;
-use crate::{memory, mesh, volume};
+use crate::{memory, mesh, out_of_core, volume};
 
 pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let start = Instant::now();
@@ -34,6 +34,9 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
         AtomicFile::create(report).map(drop).map_err(|error| volume::cannot_write(report, &error))?;
     }
     set_threads(&args.method)?;
+    if let Some(target) = out_of_core::target(&args) {
+        return out_of_core::run(&args, &input, &target, &request, start);
+    }
     let reporter = Reporter::new(args.quiet);
     let mut stages = Stages::default();
 

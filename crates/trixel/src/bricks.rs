@@ -7,6 +7,7 @@
 use std::ops::Range;
 
 use crate::grid::Grid;
+use crate::lattice::STEP_BITS;
 use crate::volume::{Volume, VolumeError, WORD_BITS};
 
 /// Voxels along the edge of a brick.
@@ -273,6 +274,20 @@ impl BrickMap {
     pub fn pillars_of(grid: &Grid) -> [u32; 2] {
         let [nx, ny, _] = grid.dims();
         [nx, ny].map(|n| n.div_ceil(PILLAR_SIDE))
+    }
+
+    /// The x of the pillars whose voxels a triangle may meet, with its corners on the grid's lattice.
+    #[must_use]
+    pub fn layers_of(grid: &Grid, triangle: &[[i64; 3]; 3]) -> Range<u32> {
+        let [a, b, c] = triangle.map(|corner| corner[0]);
+        let last = i64::from(grid.dims()[0]) - 1;
+        let low = (a.min(b).min(c) - 1) >> STEP_BITS;
+        let high = a.max(b).max(c) >> STEP_BITS;
+        if low > last || high < 0 {
+            return 0..0;
+        }
+        let layer = |x: i64| u32::try_from(x.clamp(0, last)).unwrap_or(0) / PILLAR_SIDE;
+        layer(low)..layer(high) + 1
     }
 
     /// The pillar at `[px, py]`, if it may hold voxels.
