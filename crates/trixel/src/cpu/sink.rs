@@ -37,6 +37,30 @@ impl Slab<'_> {
     }
 }
 
+impl Slab<'_> {
+    /// Sets the voxels of a cube of two, whose columns' bits are in one word: all four without asking which are set, as
+    /// that guess is wrong too often. `false`, and nothing done, where the four are not all in the slab.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be inside the slab")]
+    fn set_four(&mut self, low: [i64; 3], word: usize, bits: u64, shift: u32) -> bool {
+        let [x, y] = [low[0] - self.start[0], low[1] - self.start[1]];
+        if (x | y) < 0 {
+            return false;
+        }
+        let first = (x as usize * self.columns + y as usize) * self.column_words + word;
+        let (beside, layer) = (self.column_words, self.columns * self.column_words);
+        // At the end of a row, the column beside is the first of the next: its bits are 0 then.
+        let Some(words) = self.words.get_mut(first..).filter(|words| words.len() > layer + beside) else {
+            return false;
+        };
+        words[0] |= (bits & 3) << shift;
+        words[beside] |= (bits >> 2 & 3) << shift;
+        words[layer] |= (bits >> 4 & 3) << shift;
+        words[layer + beside] |= (bits >> 6 & 3) << shift;
+        true
+    }
+}
+
 /// Sets the voxels of a run.
 pub(super) struct SetRuns<'a>(pub(super) Slab<'a>);
 
@@ -64,6 +88,9 @@ impl Sink for SetRuns<'_> {
         let z = (low[2] - self.0.start[2]) as u32;
         let (word, shift) = ((z / WORD_BITS) as usize, z % WORD_BITS);
         let side = SIDE as u32;
+        if SIDE == 2 && shift <= WORD_BITS - side && self.0.set_four(low, word, bits, shift) {
+            return;
+        }
         while bits != 0 {
             let column = bits.trailing_zeros() / side;
             let run = bits >> (column * side) & ((1 << side) - 1);

@@ -62,6 +62,8 @@ mod parallel {
 
     /// Triangles sorted by one task.
     const CHUNK: usize = 1 << 14;
+    /// Triangles that are looked at to cut the grid.
+    const SAMPLES: usize = 1 << 13;
 
     /// The range of x that a triangle's box meets inside the grid, and the work that it stands for.
     #[inline(always)]
@@ -130,26 +132,19 @@ mod parallel {
     fn cut(mesh: &LatticeMesh<'_>, dims: [u32; 3], pieces: usize) -> Vec<u32> {
         let nx = dims[0] as usize;
         let [nx_signed, ny, _] = dims.map(i64::from);
+        // Where the work is, is known well enough from some of the triangles.
+        let every = (mesh.triangles.len() / SAMPLES).max(1);
         // Differences of the work at each x, so that a triangle costs two additions however long it is.
-        let differences = mesh
-            .triangles
-            .par_chunks(CHUNK)
-            .fold(
-                || vec![0i64; nx + 1],
-                |mut differences, chunk| {
-                    for &triangle in chunk {
-                        let corners = corners(mesh, triangle);
-                        if let Some([low, high]) = x_range(&corners, nx_signed) {
-                            #[expect(clippy::cast_possible_wrap, reason = "at most the grid's columns along y")]
-                            let weight = weight_per_x(&corners, ny) as i64;
-                            differences[low] += weight;
-                            differences[high + 1] -= weight;
-                        }
-                    }
-                    differences
-                },
-            )
-            .reduce(|| vec![0i64; nx + 1], |a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect());
+        let mut differences = vec![0i64; nx + 1];
+        for &triangle in mesh.triangles.iter().step_by(every) {
+            let corners = corners(mesh, triangle);
+            if let Some([low, high]) = x_range(&corners, nx_signed) {
+                #[expect(clippy::cast_possible_wrap, reason = "at most the grid's columns along y, and the triangles")]
+                let weight = (weight_per_x(&corners, ny) * every as u64) as i64;
+                differences[low] += weight;
+                differences[high + 1] -= weight;
+            }
+        }
         // Empty layers still have to be cleared and filled.
         let per_layer = 1 + ny / 64;
         let mut at_x = 0;
