@@ -45,7 +45,8 @@ pub trait Occupancy: Sync {
     fn count(&self) -> u64;
 
     /// Calls `visit` for the set voxels `[x, y, z]` in `range`, up to 64 along z at a time, sorted by x, then y, then z:
-    /// bit i of the word, which is not 0, is the voxel `[x, y, z + i]`. Voxels outside the grid are not set.
+    /// bit i of the word, which is not 0, is the voxel `[x, y, z + i]`. The word may start before the range, by less than
+    /// 64; its set bits do not. Voxels outside the grid are not set.
     fn for_each_word(&self, range: &[Range<u32>; 3], visit: impl FnMut([u32; 3], u64));
 }
 

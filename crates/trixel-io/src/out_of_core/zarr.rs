@@ -100,7 +100,11 @@ impl ZarrWriter {
             let low = [x * CHUNK, y * side, z * side];
             let range = [low[0]..low[0] + CHUNK, low[1]..low[1] + side, low[2]..low[2] + side];
             let mut any = false;
-            voxels.for_each_word(&range, |at, mut word| {
+            voxels.for_each_word(&range, |mut at, mut word| {
+                // A word may start before the range; its bits do not.
+                let before = low[2].saturating_sub(at[2]);
+                at[2] += before;
+                word >>= before;
                 if !any {
                     buffer.fill(0);
                     any = true;
