@@ -2,7 +2,7 @@
 
 Usage: check_volumes.py FOLDER
 
-Each sub-folder of FOLDER holds one volume in every format, as `volume.EXTENSION` (and `sparse.npz`), with what is
+Each sub-folder of FOLDER holds one volume in every format, as `volume.EXTENSION` (and `sparse.npz`, `points.ply`), with what is
 expected beside them, made without trixel's writers: `expected.json` (grid, up axis, surface area and volume) and
 `expected.bin` (one byte a voxel, [x, y, z] in C order).
 """
@@ -16,6 +16,7 @@ import nrrd
 import numpy as np
 import pyvista
 import trimesh
+import zarr
 from trimesh.exchange import binvox
 
 HERE = pathlib.Path(__file__).parent
@@ -57,6 +58,14 @@ def check_sparse(path, expected):
         occupancy = np.zeros(arrays["dims"], dtype=bool)
         occupancy[tuple(indices.T)] = True
         expected.check(occupancy, arrays["origin"], arrays["voxel_size"])
+
+
+def check_zarr(path, expected):
+    array = zarr.open_group(path, mode="r")["occupancy"]
+    assert array.dtype == bool and array.metadata.zarr_format == 3
+    assert array.metadata.dimension_names == ("x", "y", "z")
+    assert array.chunks == (64, 64, 64) and array.shards is not None
+    expected.check(array[:], array.attrs["origin"], array.attrs["voxel_size"])
 
 
 def check_npy(path, expected):
@@ -166,6 +175,15 @@ def check_mesh(path, expected):
     check_surface(mesh, expected)
 
 
+def check_points(path, expected):
+    loaded = trimesh.load(path)
+    # A scene without anything in it where there are no points.
+    points = getattr(loaded, "vertices", np.zeros((0, 3)))
+    # argwhere sorts by x, y, z too.
+    centres = expected.origin + (np.argwhere(expected.occupancy) + 0.5) * expected.voxel_size
+    assert np.array_equal(points, centres)
+
+
 def check_glb(path, expected):
     # The scene, so that the node's transform counts; it turns up to y.
     scene = trimesh.load(path, force="scene")
@@ -196,6 +214,8 @@ def check_empty(path):
 CHECKS = {
     "volume.npz": check_npz,
     "sparse.npz": check_sparse,
+    "points.ply": check_points,
+    "volume.zarr": check_zarr,
     "volume.npy": check_npy,
     "volume.raw": check_raw,
     "volume.binvox": check_binvox,

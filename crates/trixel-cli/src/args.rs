@@ -81,7 +81,7 @@ pub(crate) struct VoxelizeArgs {
     /// Write the voxels here; may be given several times.
     ///
     /// .npz and .npy (NumPy), .binvox, .vox (MagicaVoxel), .vti (VTK), .nrrd, .raw with .json; .obj, .ply, .stl and
-    /// .glb (the exposed faces); .png (a shaded picture).
+    /// .glb (the exposed faces); .png (a shaded picture); .zarr (a Zarr v3 folder, alone).
     #[arg(short, long = "output", value_name = "OUT")]
     pub(crate) outputs: Vec<PathBuf>,
 
@@ -102,9 +102,24 @@ pub(crate) struct VoxelizeArgs {
     #[command(flatten)]
     pub(crate) attributes: AttributeArgs,
 
-    /// Write .npz as a list of set voxels (`indices`) instead of a dense array.
+    /// Write .npz as a list of set voxels (`indices`) instead of a dense array, and .ply as a cloud of their centres
+    /// instead of faces.
+    ///
+    /// With .npz, .ply and .vox alone, memory then follows the surface instead of the grid; a grid that would not fit the
+    /// memory is written so without asking.
     #[arg(long, help_heading = "Output")]
     pub(crate) sparse: bool,
+
+    /// Take at most this much memory, such as 2GiB; for a single .zarr output, which is written tile by tile.
+    ///
+    /// The plan (tiles, memory, time) is printed first. Binary STL and PLY files of triangles that do not fit are read in
+    /// passes. By default what is available.
+    #[arg(long, value_name = "SIZE", value_parser = crate::out_of_core::parse_size, help_heading = "Output")]
+    pub(crate) memory_limit: Option<u64>,
+
+    /// Go on where a run that was killed stopped; its tiles are in NAME.zarr.partial. Give the same options again.
+    #[arg(long, help_heading = "Output")]
+    pub(crate) resume: bool,
 
     /// The axis of the mesh that points up, for formats with a notion of up (.vox, .glb, .png).
     ///

@@ -38,12 +38,17 @@ pub(crate) struct Ran {
     pub(crate) download_ms: Option<f64>,
 }
 
-/// Whether the arguments can only mean a GPU.
-fn wants_gpu(method: &MethodArgs) -> bool {
-    matches!(method.backend, BackendArg::Gpu) || method.gpu.adapter.is_some()
-}
-
 impl Engine {
+    /// Whether the arguments ask for a GPU by name.
+    fn is_gpu_named(method: &MethodArgs) -> bool {
+        matches!(method.backend, BackendArg::Gpu) || method.gpu.adapter.is_some()
+    }
+
+    /// Whether the arguments can only mean a GPU.
+    pub(crate) fn wants_gpu(method: &MethodArgs) -> bool {
+        Self::is_gpu_named(method) || STRATEGIES.contains(&method.strategy.into())
+    }
+
     /// Refuses arguments that contradict each other, before anything is read.
     pub(crate) fn check(method: &MethodArgs) {
         let strategy = Strategy::from(method.strategy);
@@ -56,7 +61,7 @@ impl Engine {
                 usage(&format!("--strategy {strategy} is one of the GPU's; use --backend gpu"));
             }
         }
-        if wants_gpu(method) && strategy == Strategy::ColumnRuns {
+        if Self::is_gpu_named(method) && strategy == Strategy::ColumnRuns {
             usage("--strategy column-runs is the processor's; leave it out, or use --backend cpu");
         }
     }
@@ -64,7 +69,7 @@ impl Engine {
     /// Opens what the arguments ask for.
     pub(crate) fn open(method: &MethodArgs, reporter: &Reporter) -> Result<Self> {
         let strategy = Strategy::from(method.strategy);
-        let asked = wants_gpu(method);
+        let asked = Self::is_gpu_named(method);
         let of_gpu = STRATEGIES.contains(&strategy);
         let cpu = matches!(method.backend, BackendArg::Cpu) || strategy == Strategy::ColumnRuns;
         if cpu || !asked && !of_gpu && !trixel_gpu::hardware_is_possible() {
@@ -92,11 +97,8 @@ impl Engine {
         let cutoff = cutoff
             .or_else(|| tuned::load(gpu.info(), heuristic, reporter))
             .unwrap_or_else(|| Cutoff::default_for(gpu.info(), heuristic));
-        let options = Options {
-            cutoff: Some(cutoff),
-            dilation: method.gpu.dilation.into(),
-            count: method.gpu.counters,
-        };
+        let options =
+            Options { cutoff: Some(cutoff), dilation: method.gpu.dilation.into(), count: method.gpu.counters };
         Ok(Self::Gpu { gpu: Box::new(gpu), options, cpu_may_help: !asked && !of_gpu })
     }
 
@@ -124,23 +126,25 @@ impl Engine {
     }
 }
 
-fn run_on_cpu(
-    mesh: &LatticeMesh<'_>,
-    job: &Job,
-    volume: &mut Volume,
+fn run_on_cpu(mesh: &LatticeMesh<'_>, job: &Job, volume: &mut Volume, repeat: u32, reporter: &Reporter) -> Result<Ran> {
+    on_cpu(repeat, reporter, || CpuBackend::default().voxelize(mesh, job, volume))
+}
+
+/// Runs a voxelization on the CPU `repeat` times.
+pub(crate) fn on_cpu(
     repeat: u32,
     reporter: &Reporter,
+    mut voxelize: impl FnMut() -> Result<Strategy, trixel::Error>,
 ) -> Result<Ran> {
-    let backend = CpuBackend::default();
     let mut samples_ms = vec![];
-    let mut strategy = job.strategy();
+    let mut strategy = Strategy::Auto;
     for _ in 0..repeat {
-        let (used, ms) = reporter.stage("voxelizing", || backend.voxelize(mesh, job, volume));
+        let (used, ms) = reporter.stage("voxelizing", &mut voxelize);
         strategy = used?;
         samples_ms.push(ms);
     }
     Ok(Ran {
-        backend: backend.name(),
+        backend: CpuBackend::default().name(),
         strategy,
         adapter: None,
         counters: None,

@@ -53,7 +53,11 @@ impl GridRequest {
 
     /// The grid for a mesh.
     pub(crate) fn resolve(&self, mesh: &Mesh, reporter: &Reporter) -> Result<Grid> {
-        let bounds = mesh.bounds().context("the mesh has no triangles")?;
+        self.resolve_in(mesh.bounds().context("the mesh has no triangles")?, reporter)
+    }
+
+    /// The grid for a mesh with this box.
+    pub(crate) fn resolve_in(&self, bounds: Bounds, reporter: &Reporter) -> Result<Grid> {
         match self {
             Self::Fit(resolution) => Ok(Grid::fit(&bounds, *resolution)?),
             Self::Like(path) => {

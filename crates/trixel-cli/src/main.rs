@@ -7,6 +7,7 @@ mod grid;
 mod info;
 mod memory;
 mod mesh;
+mod out_of_core;
 mod progress;
 mod report;
 mod tune;
@@ -14,6 +15,7 @@ mod tuned;
 mod verify;
 mod volume;
 mod voxelize;
+mod voxels;
 
 use std::process::ExitCode;
 

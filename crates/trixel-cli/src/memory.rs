@@ -9,6 +9,13 @@ pub(crate) fn available() -> Option<u64> {
     Some(machine.min(container)).filter(|&bytes| bytes > 0)
 }
 
+/// Bytes that voxels may take.
+pub(crate) fn available_for_voxels() -> Option<u64> {
+    /// Left free for the mesh, the writers and everybody else.
+    const RESERVE_BYTES: u64 = 256 << 20;
+    available().map(|bytes| bytes.saturating_sub(RESERVE_BYTES))
+}
+
 /// The most bytes that this process had resident at once, where the system tells.
 pub(crate) fn peak() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;

@@ -60,21 +60,31 @@ impl Reporter {
 
     /// Shows how far the running stage is, from 0 to 1.
     pub(crate) fn fraction(&self, done: f32) {
-        const STEPS: f32 = 1000.0;
-        if self.bar.length().is_none() {
-            self.bar.set_length(1000);
-            if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} [{bar:30}] {percent}% {elapsed}") {
-                self.bar.set_style(style.progress_chars("=> "));
-            }
-        }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1000")]
-        self.bar.set_position((done.clamp(0.0, 1.0) * STEPS) as u64);
+        show_fraction(&self.bar, done);
+    }
+
+    /// [`Self::fraction`], for any thread.
+    pub(crate) fn fractions(&self) -> impl Fn(f32) + Sync + use<> {
+        let bar = self.bar.clone();
+        move |done| show_fraction(&bar, done)
     }
 
     /// Takes the bar away.
     pub(crate) fn finish(&self) {
         self.bar.finish_and_clear();
     }
+}
+
+fn show_fraction(bar: &ProgressBar, done: f32) {
+    const STEPS: f32 = 1000.0;
+    if bar.length().is_none() {
+        bar.set_length(1000);
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} [{bar:30}] {percent}% {elapsed}") {
+            bar.set_style(style.progress_chars("=> "));
+        }
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1000")]
+    bar.set_position((done.clamp(0.0, 1.0) * STEPS) as u64);
 }
 
 impl Drop for Reporter {

@@ -9,8 +9,8 @@ use trixel::{Mode, Topology, Volume};
 use trixel_io::volume_read::read_volume;
 
 use crate::args::VerifyArgs;
-use crate::progress::Reporter;
 use crate::engine::Engine;
+use crate::progress::Reporter;
 use crate::voxelize::{ContextOf, allocate, check_method, job, set_threads, warn_if_open};
 use crate::{memory, mesh};
 

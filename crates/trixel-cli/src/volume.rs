@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::out_of_core::is_zarr;
 use anyhow::{Result, anyhow, ensure};
 use trixel::{Grid, Volume};
 use trixel_io::VolumeFormat;
@@ -17,8 +18,8 @@ fn is_picture(path: &Path) -> bool {
 pub(crate) fn check_extension(path: &Path) -> Result<()> {
     let known = VolumeFormat::ALL.map(|format| format!(".{}", format.extension())).join(", ");
     ensure!(
-        is_picture(path) || VolumeFormat::from_path(path).is_some(),
-        "{}: unknown volume format; trixel writes {known} and .png",
+        is_picture(path) || is_zarr(path) || VolumeFormat::from_path(path).is_some(),
+        "{}: unknown volume format; trixel writes {known}, .zarr and .png",
         path.display()
     );
     Ok(())

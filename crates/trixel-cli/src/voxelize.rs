@@ -19,15 +19,13 @@ use crate::engine::Engine;
 use crate::grid::{GridRequest, usage};
 use crate::progress::Reporter;
 use crate::report::{AttributesReport, GridReport, MeshReport, Report, Samples, Stages, median};
-use crate::{attributes, memory, mesh, volume};
-
-/// Left free beside a dense grid, for the mesh, the writers and everybody else.
-const RESERVE_BYTES: u64 = 256 << 20;
+use crate::voxels::Voxels;
+use crate::{attributes, memory, mesh, out_of_core, volume};
 
 pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let start = Instant::now();
     let request = GridRequest::from_args(&args.grid, &mut args.input);
-    let Some(input) = args.input else { usage("INPUT is missing: a mesh file, or scene:NAME") };
+    let Some(input) = args.input.take() else { usage("INPUT is missing: a mesh file, or scene:NAME") };
     if args.outputs.is_empty() && args.report.is_none() {
         usage("nothing to write: give -o OUT (for example -o voxels.npz) or --report FILE.json");
     }
@@ -39,6 +37,9 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
         AtomicFile::create(report).map(drop).map_err(|error| volume::cannot_write(report, &error))?;
     }
     set_threads(&args.method)?;
+    if let Some(target) = out_of_core::target(&args) {
+        return out_of_core::run(&args, &input, &target, &request, start);
+    }
     let reporter = Reporter::new(args.quiet);
     let mut stages = Stages::default();
 
@@ -53,8 +54,8 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
         volume::check_output(output, job.grid())?;
     }
 
-    let request = attributes::request(&args.attributes, &loaded)?;
-    if request.is_some() {
+    let wanted = attributes::request(&args.attributes, &loaded)?;
+    if wanted.is_some() {
         let (warnings, ms) = reporter.stage("decoding textures", || decode_textures(&mut loaded));
         warnings.into_iter().for_each(|warning| reporter.warn(format!("{input}: {warning}")));
         stages.textures = Some(ms);
@@ -73,30 +74,33 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let lattice = lattice.with_context_of(&input)?;
     stages.snap = snap_ms;
 
-    let (voxels, allocate_ms) = reporter.stage("allocating", || allocate(&job));
+    let (engine, open_ms) = reporter.stage("choosing a backend", || Engine::open(&args.method, &reporter));
+    let engine = engine?;
+    let (voxels, allocate_ms) = reporter.stage("allocating", || Voxels::allocate(&args, &engine, &job));
     let mut voxels = voxels?;
     stages.allocate = allocate_ms;
 
-    let (engine, open_ms) = reporter.stage("choosing a backend", || Engine::open(&args.method, &reporter));
-    let ran = engine?.run(&lattice, &job, &mut voxels, args.repeat.get(), &reporter)?;
+    let ran = voxels.fill(&engine, &lattice, &job, args.repeat.get(), &reporter)?;
     stages.open = ran.check_ms.map(|check_ms| open_ms + check_ms);
     stages.upload = ran.upload_ms;
     stages.download = ran.download_ms;
     let samples = Samples { voxelize: ran.samples_ms };
     stages.voxelize = median(&samples.voxelize);
-    let rank = request.as_ref().map(|_| {
-        let (rank, ms) = reporter.stage("ranking", || Rank::new(&voxels));
+    // Bricks are only chosen where no attributes were asked for.
+    let dense = voxels.dense();
+    let rank = dense.filter(|_| wanted.is_some()).map(|dense| {
+        let (rank, ms) = reporter.stage("ranking", || Rank::new(dense));
         stages.rank = Some(ms);
         rank
     });
-    let described = match &request {
-        Some(request) => {
-            let (described, ms) = reporter
-                .stage("finding attributes", || compute(&loaded, &lattice, &job, &voxels, request));
+    let described = match (&wanted, dense) {
+        (Some(wanted), Some(dense)) => {
+            let (described, ms) =
+                reporter.stage("finding attributes", || compute(&loaded, &lattice, &job, dense, wanted));
             stages.attributes = Some(ms);
             Some(described?)
         }
-        None => None,
+        _ => None,
     };
     let described_voxels = rank.as_ref().zip(described.as_ref()).and_then(|(rank, d)| Described::new(rank, d));
     drop(lattice);
@@ -122,7 +126,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
                     described: described_voxels,
                     progress: Some(&|f| reporter.fraction(f)),
                 };
-                staged = std::mem::take(&mut staged).join(volume::stage_output(output, &voxels, &options)?);
+                staged = std::mem::take(&mut staged).join(voxels.stage_output(output, &options)?);
             }
             Ok(())
         });
@@ -235,8 +239,7 @@ pub(crate) fn job(method: &MethodArgs, grid: trixel::Grid) -> Result<Job> {
 
 /// An empty volume, if there is memory for it.
 pub(crate) fn allocate(job: &Job) -> Result<Volume> {
-    let available = memory::available().map(|bytes| bytes.saturating_sub(RESERVE_BYTES));
-    Ok(Volume::with_memory_limit(*job.grid(), available)?)
+    Ok(Volume::with_memory_limit(*job.grid(), memory::available_for_voxels())?)
 }
 
 /// Tells that a solid of an open mesh is not what its user may think.

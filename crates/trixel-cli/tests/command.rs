@@ -274,7 +274,7 @@ fn failures_exit_with_1_and_say_what_to_do() {
         ("voxelize t.obj -o t.obj", &["t.obj", "input"]),
         ("voxelize t.obj -o a.npz -o a.vox -r 3000", &["a.vox", "2000"]),
         ("voxelize t.obj -o a.binvox --voxel-size 1 2 3", &["a.binvox"]),
-        ("voxelize t.obj -o a.npz --dims 32768 32768 32768", &["4.0 TiB", "available", "resolution"]),
+        ("voxelize t.obj -o a.vti --dims 32768 32768 32768", &["4.0 TiB", "available", "resolution"]),
         ("voxelize t.obj -o a.npz --voxel-size 1e-9", &["32768"]),
         ("voxelize t.obj -o a.npz --like none.npz", &["none.npz"]),
         ("voxelize t.obj -o a.npz --like broken.npz", &["broken.npz"]),
@@ -413,4 +413,94 @@ fn priorities_name_materials() {
     bench.fails(1, &format!("{arguments} --priority green -o green.npz"), &["green", "red, blue"]);
     bench.fails(2, "voxelize square.obj -r 8 --combine first -o a.npz", &["--attributes"]);
     bench.fails(2, "voxelize square.obj -r 8 --attributes colour -o a.npz", &["colour", "color"]);
+}
+
+#[test]
+fn sparse_outputs_take_grids_far_beyond_the_memory() {
+    let bench = Bench::new();
+    // Dense, 4 TiB.
+    let huge = "voxelize scene:sphere:8 --dims 32768 32768 32768 --voxel-size 0.05 --origin -2 -3 -4";
+    bench.ok(&format!("{huge} -o huge.npz -o huge.ply --report huge.json"));
+    bench.ok("voxelize scene:sphere:8 --dims 70 90 110 --voxel-size 0.05 --origin -2 -3 -4 -o small.ply --sparse");
+    let centres = |name: &str| {
+        let bytes = std::fs::read(bench.path(name)).unwrap();
+        let end = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
+        bytes[end..].to_vec()
+    };
+    assert!(!centres("small.ply").is_empty());
+    assert!(centres("huge.ply") == centres("small.ply"));
+    bench.fails(1, &format!("{huge} -o huge.npz -o huge.vti"), &["huge.vti takes a dense grid", "4.0 TiB"]);
+    let report: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(bench.path("huge.json")).unwrap()).unwrap();
+    assert_eq!(report["voxels"].as_u64().unwrap() * 24, centres("huge.ply").len() as u64);
+}
+
+/// Every file of a folder, by its path in it.
+fn files_of(folder: &Path) -> std::collections::BTreeMap<std::path::PathBuf, Vec<u8>> {
+    let mut found = std::collections::BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(current) = folders.pop() {
+        for entry in std::fs::read_dir(current).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                found.insert(path.strip_prefix(folder).unwrap().to_owned(), std::fs::read(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn a_killed_run_is_resumed_and_gives_the_identical_result() {
+    let bench = Bench::new();
+    // A file to be read in passes, from the faces of voxels.
+    bench.ok("voxelize scene:torus:64 -r 200 --mode solid -o mesh.stl");
+    let arguments =
+        |name: &str| format!("voxelize mesh.stl -r 1500 -m solid -o {name} --memory-limit 120MiB --threads 2");
+    let whole = bench.ok(&arguments("whole.zarr"));
+    assert!(whole.stderr.contains("plan: ") && whole.stderr.contains(" to read"), "{}", whole.stderr);
+
+    let mut kills = 0;
+    for round in 0..5 {
+        let resume = if bench.path("killed.zarr.partial").exists() { " --resume" } else { "" };
+        let mut child = Command::new(env!("CARGO_BIN_EXE_trixel"))
+            .args((arguments("killed.zarr") + resume).split_whitespace())
+            .current_dir(&bench.0)
+            .stderr(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        // Some more tiles each time, and then at whatever it is doing.
+        let journal = bench.path("killed.zarr.partial").join("trixel-journal");
+        let tiles = || std::fs::read_to_string(&journal).map_or(0, |text| text.lines().count());
+        let goal = tiles() + 3 + 2 * round;
+        while tiles() < goal && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        kills += u32::from(child.kill().is_ok() && !bench.path("killed.zarr").exists());
+        child.wait().unwrap();
+    }
+    assert!(kills >= 2, "it was too fast to be killed");
+    if !bench.path("killed.zarr").exists() {
+        bench.ok(&(arguments("killed.zarr") + " --resume --report killed.json"));
+        let report: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(bench.path("killed.json")).unwrap()).unwrap();
+        assert!(report["resumed_tiles"].as_u64().unwrap() > 5, "{report}");
+    }
+    assert!(!bench.path("killed.zarr.partial").exists());
+    assert!(files_of(&bench.path("killed.zarr")) == files_of(&bench.path("whole.zarr")));
+}
+
+#[test]
+fn out_of_core_says_what_is_wrong() {
+    let bench = Bench::new();
+    bench.fails(2, "voxelize scene:cube -o a.npz --memory-limit 1GiB", &["--memory-limit", ".zarr"]);
+    bench.fails(2, "voxelize scene:cube -o a.zarr -o a.npz", &[".zarr", "only"]);
+    bench.fails(2, "voxelize scene:cube -o a.zarr --memory-limit 3potatoes", &["2GiB or 500MB"]);
+    bench.fails(1, "voxelize scene:cube -o a.zarr --memory-limit 10MiB", &["10.0 MiB is too small"]);
+    bench.fails(1, "voxelize scene:cube -o a.zarr --resume", &["a.zarr.partial", "without --resume"]);
+    bench.fails(1, "voxelize scene:cube -o none/a.zarr", &["no folder none"]);
+    bench.ok("voxelize scene:cube -r 20 -o a.zarr --memory-limit 1GiB");
+    bench.fails(1, "voxelize scene:cube -r 20 -o a.zarr", &["a.zarr exists already"]);
 }

@@ -31,7 +31,8 @@ pub(crate) fn parse(bytes: &[u8]) -> (Counters, u64) {
     for (value, word) in values.iter_mut().zip(bytes.as_chunks::<8>().0) {
         *value = u64::from_le_bytes(*word);
     }
-    let [invocations, fragments, fragments_discarded, columns, voxel_tests, voxels_written, atomics, too_large] = values;
+    let [invocations, fragments, fragments_discarded, columns, voxel_tests, voxels_written, atomics, too_large] =
+        values;
     let counters =
         Counters { invocations, fragments, fragments_discarded, columns, voxel_tests, voxels_written, atomics };
     (counters, too_large)

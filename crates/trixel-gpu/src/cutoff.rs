@@ -20,8 +20,7 @@ pub enum Heuristic {
 
 impl Heuristic {
     /// Every heuristic.
-    pub const ALL: [Self; 5] =
-        [Self::ProjectedArea, Self::BoxArea, Self::DilatedArea, Self::AreaRatio, Self::Extent];
+    pub const ALL: [Self; 5] = [Self::ProjectedArea, Self::BoxArea, Self::DilatedArea, Self::AreaRatio, Self::Extent];
 
     /// The name on the command line and in reports.
     #[must_use]

@@ -146,7 +146,12 @@ impl Gpu {
     }
 
     /// Reads the first bytes of a buffer that allows mapping.
-    pub(crate) fn read<T>(&self, buffer: &wgpu::Buffer, bytes: u64, take: impl FnOnce(&[u8]) -> T) -> Result<T, GpuError> {
+    pub(crate) fn read<T>(
+        &self,
+        buffer: &wgpu::Buffer,
+        bytes: u64,
+        take: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T, GpuError> {
         if bytes == 0 {
             return Ok(take(&[]));
         }
@@ -179,7 +184,12 @@ impl Gpu {
         // Zero-sized bindings are refused by wgpu.
         let size = bytes.next_multiple_of(4).max(4);
         self.guarded(|| {
-            self.device().create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+            self.device().create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
         })
     }
 
@@ -192,7 +202,12 @@ impl Gpu {
     ) -> Result<wgpu::Buffer, GpuError> {
         let size = (contents.len() as u64).next_multiple_of(4).max(4);
         let buffer = self.guarded(|| {
-            self.device().create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true })
+            self.device().create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: true,
+            })
         })?;
         if !contents.is_empty() {
             let mut view =

@@ -95,8 +95,8 @@ impl GpuMesh {
         if !triangles.is_empty() {
             chunks.push(Chunk::new(gpu, positions.as_flattened(), triangles.as_flattened())?);
         }
-        let leftover = (!leftover.is_empty())
-            .then(|| Leftover { positions: mesh.positions.clone(), triangles: leftover });
+        let leftover =
+            (!leftover.is_empty()).then(|| Leftover { positions: mesh.positions.clone(), triangles: leftover });
         Ok(Self { chunks, leftover, most_columns: Some(most_columns) })
     }
 
@@ -134,7 +134,11 @@ impl Chunk {
     fn new(gpu: &Gpu, positions: &[i32], indices: &[u32]) -> Result<Self, GpuError> {
         let triangles = u32::try_from(indices.len() / 3).unwrap_or(u32::MAX);
         Ok(Self {
-            positions: gpu.buffer_with("trixel positions", bytemuck::cast_slice(positions), wgpu::BufferUsages::STORAGE)?,
+            positions: gpu.buffer_with(
+                "trixel positions",
+                bytemuck::cast_slice(positions),
+                wgpu::BufferUsages::STORAGE,
+            )?,
             indices: gpu.buffer_with("trixel indices", bytemuck::cast_slice(indices), wgpu::BufferUsages::STORAGE)?,
             triangles,
         })

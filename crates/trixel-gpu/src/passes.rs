@@ -12,8 +12,8 @@ use crate::mesh::{Chunk, GpuMesh};
 use crate::pipelines::{Pipeline, TARGET_FORMAT};
 use crate::shader::{Stage, Variant};
 use crate::timer::Timer;
-use crate::voxelizer::Classification;
 use crate::volume::{GpuVolume, Slab};
+use crate::voxelizer::Classification;
 
 /// `Params` of `common.wgsl`.
 #[repr(C)]
@@ -92,8 +92,7 @@ impl Lists {
 
 impl Scratch {
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        let counters =
-            wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        let counters = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         Ok(Self {
             counters: gpu.buffer("trixel counters", counters::BYTES, counters)?,
             status: status_buffer(gpu, counters::BYTES)?,
@@ -222,7 +221,13 @@ impl<'a> Recorder<'a> {
                 self.fill(encoder, &part);
             }
         }
-        encoder.copy_buffer_to_buffer(&self.setting.scratch.counters, 0, &self.setting.scratch.status, 0, counters::BYTES);
+        encoder.copy_buffer_to_buffer(
+            &self.setting.scratch.counters,
+            0,
+            &self.setting.scratch.status,
+            0,
+            counters::BYTES,
+        );
         if let Some(timer) = &self.setting.timer {
             timer.resolve(encoder);
         }
@@ -251,7 +256,8 @@ impl<'a> Recorder<'a> {
         if wants_lists && !scratch.lists.as_ref().is_some_and(fits) {
             scratch.lists = Some(Lists::new(gpu, capacity)?);
         }
-        let fits = |scan: &ScanBuffers| scan.levels.first().is_some_and(|level| level.size() >= u64::from(capacity) * 4);
+        let fits =
+            |scan: &ScanBuffers| scan.levels.first().is_some_and(|level| level.size() >= u64::from(capacity) * 4);
         if strategy == Strategy::Balanced && !scratch.scan.as_ref().is_some_and(fits) {
             scratch.scan = Some(ScanBuffers::new(gpu, capacity)?);
         }
@@ -413,8 +419,7 @@ impl<'a> Recorder<'a> {
             .collect();
         let total = &levels[levels.len() - 1];
         let arguments = self.arguments_group(total, &scan.arguments);
-        let pairs =
-            bind(gpu, &layouts.list_read, &[&levels[0], total].map(wgpu::Buffer::as_entire_binding));
+        let pairs = bind(gpu, &layouts.list_read, &[&levels[0], total].map(wgpu::Buffer::as_entire_binding));
 
         let count = self.compute_pipeline(Stage::CountColumns);
         let scan_blocks = self.compute_pipeline(Stage::ScanBlocks);

@@ -56,7 +56,9 @@ impl Stage {
             Self::TriangleParallel { .. } => shader!(
                 "wide" "common" "triangle" "size" "column" "columns" "voxels" "counters" "triangle_parallel"
             ),
-            Self::TriangleList { .. } => shader!("wide" "common" "triangle" "column" "columns" "voxels" "counters" "triangle_list"),
+            Self::TriangleList { .. } => {
+                shader!("wide" "common" "triangle" "column" "columns" "voxels" "counters" "triangle_list")
+            }
             Self::Classify => shader!("wide" "common" "triangle" "size" "counters" "classify"),
             Self::FragmentParallel { .. } => {
                 shader!("wide" "common" "triangle" "column" "voxels" "counters" "fragment_parallel")

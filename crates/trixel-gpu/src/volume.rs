@@ -60,8 +60,7 @@ impl GpuVolume {
                 limit: gpu.limits().binding_bytes,
             });
         };
-        let usage =
-            wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let slabs = (0..nx)
             .step_by(step as usize)
             .map(|x| {

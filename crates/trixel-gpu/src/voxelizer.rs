@@ -188,7 +188,8 @@ impl Voxelizer {
         let initial = self.cpu_part(mesh)?;
         let gpu = self.gpu.clone();
         // One guard around everything: most of what is recorded is only checked by the driver much later.
-        let recorded = gpu.guarded(|| self.recorder(mesh, volume)?.record(encoder, strategy, classification, initial.as_ref()))?;
+        let recorded =
+            gpu.guarded(|| self.recorder(mesh, volume)?.record(encoder, strategy, classification, initial.as_ref()))?;
         recorded
     }
 

@@ -251,14 +251,13 @@ fn a_callers_buffers_are_used_as_they_are_and_checked() {
         let positions = buffer(&[S / 2, S / 2, S / 2, far, S / 2, S / 2, S / 2, 5 * S, S / 2]);
         let mesh = GpuMesh::from_buffers(positions, buffer(&[0, 1, 2]), 1);
         let voxels = GpuVolume::new(&gpu, grid).unwrap();
-        Voxelizer::new(&gpu, &Job::new(grid, Mode::Conservative), &Options::default())
-            .unwrap()
-            .run(&mesh, &voxels)
-            .map(|()| {
+        Voxelizer::new(&gpu, &Job::new(grid, Mode::Conservative), &Options::default()).unwrap().run(&mesh, &voxels).map(
+            |()| {
                 let mut volume = Volume::new(grid).unwrap();
                 voxels.download(&gpu, &mut volume).unwrap();
                 volume.count()
-            })
+            },
+        )
     };
     let mesh = zoo::soup(&[[[0.5; 3], [5.0, 0.5, 0.5], [0.5, 5.0, 0.5]]]);
     assert_eq!(run(5 * S).unwrap(), trixel::voxelize(&mesh, &Job::new(grid, Mode::Conservative)).unwrap().count());

@@ -7,6 +7,7 @@
 //!   each format keeps.
 //! - [`volume_read::read_volume`] reads a volume back, also from other programs, and [`volume_read::read_grid`] only
 //!   where its voxels are.
+//! - [`out_of_core`] voxelizes meshes and grids that do not fit the memory, into Zarr (feature `zarr`, on by default).
 //!
 //! Readers trust nothing: a damaged or hostile file gives an error that names the file, the place in it and what to do,
 //! never a panic, a hang or unbounded memory. What is odd but harmless becomes a warning beside the result. Files are
@@ -40,6 +41,8 @@ mod bits;
 mod extension;
 mod numbers;
 mod open;
+#[cfg(feature = "zarr")]
+pub mod out_of_core;
 pub mod read;
 pub mod textures;
 mod volume_format;

@@ -71,6 +71,12 @@ impl VolumeFormat {
         Self::ALL.into_iter().find(|format| extension::matches(path, format.extension()))
     }
 
+    /// Whether it can be written from bricks ([`crate::write::write_bricks`]), so that the grid need not fit the memory.
+    #[must_use]
+    pub fn takes_bricks(self) -> bool {
+        matches!(self, Self::Npz | Self::Ply | Self::Vox)
+    }
+
     /// Whether [`crate::volume_read`] reads the format back: those that hold voxels rather than faces, except `.vox`,
     /// whose readers need not keep what is unknown to the editor.
     #[must_use]

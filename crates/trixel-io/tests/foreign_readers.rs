@@ -97,6 +97,9 @@ fn others_read_what_is_written() {
         }
         let sparse = WriteOptions { sparse: true, ..options };
         write_volume(&folder.join("sparse.npz"), volume, &sparse).unwrap().commit().unwrap();
+        #[cfg(feature = "zarr")]
+        trixel_io::out_of_core::write_voxels(&folder.join("volume.zarr"), volume, None).unwrap();
+        write_volume(&folder.join("points.ply"), volume, &sparse).unwrap().commit().unwrap();
     }
     run("check_volumes.py", root.path());
 }

@@ -8,10 +8,11 @@ use std::path::Path;
 
 use common::{ANISOTROPIC, CUBIC, noise, samples, volume};
 use proptest::prelude::*;
-use trixel::{Grid, UpAxis, Volume};
+use trixel::lattice::LatticeMesh;
+use trixel::{CpuBackend, Grid, Job, Mode, UpAxis, Volume};
 use trixel_io::VolumeFormat;
 use trixel_io::volume_read::{VolumeReadError, read_grid, read_volume};
-use trixel_io::write::{WriteError, WriteOptions, check_target, write_volume};
+use trixel_io::write::{WriteError, WriteOptions, check_target, write_bricks, write_volume};
 
 fn write(path: &Path, volume: &Volume, options: &WriteOptions<'_>) {
     check_target(path, volume.grid()).unwrap();
@@ -363,4 +364,29 @@ fn column_major_indices_count_against_the_limit() {
             _ => assert_eq!(small.unwrap().volume.count(), 1, "rows that are not kept take no memory"),
         }
     }
+}
+
+#[test]
+fn bricks_are_written_as_the_dense_volume_would_be() {
+    let mesh = trixel::scene::build("torus:48").unwrap();
+    let grid = Grid::fit(&mesh.bounds().unwrap(), 150).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    for mode in [Mode::Conservative, Mode::Solid] {
+        let job = Job::new(grid, mode);
+        let dense = trixel::voxelize(&mesh, &job).unwrap();
+        let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
+        let bricks = CpuBackend::default().voxelize_bricks(&lattice, &job, None).unwrap();
+        for (name, up) in [("a.npz", UpAxis::Z), ("a.ply", UpAxis::Z), ("a.vox", UpAxis::Y), ("a.vox", UpAxis::X)] {
+            let options = WriteOptions { up, ..SPARSE };
+            let (from_dense, from_bricks) = (folder.path().join(name), folder.path().join(format!("bricks-{name}")));
+            write_volume(&from_dense, &dense, &options).unwrap().commit().unwrap();
+            write_bricks(&from_bricks, &bricks, &options).unwrap().commit().unwrap();
+            assert!(fs::read(&from_dense).unwrap() == fs::read(&from_bricks).unwrap(), "{name}, {mode}");
+        }
+        assert!(read_volume(&folder.path().join("bricks-a.npz"), None).unwrap().volume == dense);
+    }
+    let bricks = trixel::BrickMap::empty(grid);
+    let error = write_bricks(&folder.path().join("a.vti"), &bricks, &SPARSE).unwrap_err().to_string();
+    assert!(error.contains(".vti files hold whole grids") && error.contains(".npz, .vox and .ply"), "{error}");
+    assert!(!folder.path().join("a.vti").exists());
 }

@@ -21,6 +21,18 @@ pub(crate) fn snap_coordinate(v: f64, origin: f64, voxel_size: f64) -> f64 {
     ((v - origin) / voxel_size * f64::from(STEPS_PER_VOXEL)).round_ties_even()
 }
 
+/// A position on the lattice of `grid`, as [`LatticeMesh::snap`] places it; `None` if it is not finite or more than
+/// [`MAX_COORDINATE`] from the grid's origin.
+#[must_use]
+pub fn snap(position: [f64; 3], grid: &Grid) -> Option<[i64; 3]> {
+    #[expect(clippy::cast_precision_loss, reason = "a power of two")]
+    const LIMIT: f64 = MAX_COORDINATE as f64;
+    let (origin, voxel_size) = (grid.origin(), grid.voxel_size());
+    let snapped: [f64; 3] = std::array::from_fn(|axis| snap_coordinate(position[axis], origin[axis], voxel_size[axis]));
+    #[expect(clippy::cast_possible_truncation, reason = "in range, or rejected")]
+    snapped.iter().all(|q| q.abs() <= LIMIT).then(|| snapped.map(|q| q as i64))
+}
+
 /// A mesh on the lattice of a grid.
 #[derive(Clone, Debug)]
 pub struct LatticeMesh<'a> {

@@ -33,6 +33,7 @@ struct Readme;
 
 pub mod attributes;
 mod backend;
+mod bricks;
 #[cfg(any(test, feature = "conformance"))]
 pub mod conformance;
 mod cpu;
@@ -49,7 +50,8 @@ mod topology;
 mod volume;
 
 pub use backend::{Backend, Error, voxelize};
-pub use cpu::{CpuBackend, Instructions, ThreadsError};
+pub use bricks::{BrickMap, Occupancy};
+pub use cpu::{BinnedMesh, CpuBackend, Instructions, ThreadsError};
 pub use grid::{Grid, GridError};
 pub use job::{Job, JobError, Strategy};
 pub use material::{AlphaMode, Filter, Image, ImageSource, Material, Texture, TextureRef, Wrap};

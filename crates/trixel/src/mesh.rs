@@ -163,6 +163,9 @@ pub enum MeshError {
     /// There are more vertices than 32-bit indices can name.
     #[error("the mesh has {0} vertices; trixel indexes vertices with 32 bits (at most 4,294,967,295): split the mesh")]
     TooManyVertices(usize),
+    /// There are more triangles than 32-bit indices can name, where they have to be sorted.
+    #[error("the mesh has {0} triangles; bricks are made of at most 4,294,967,295: split the mesh")]
+    TooManyTriangles(usize),
 }
 
 impl Mesh {

@@ -38,6 +38,18 @@ pub enum VolumeError {
         /// Bytes available, where known.
         available: Option<u64>,
     },
+    /// The bricks of a sparse grid take more memory than allowed.
+    #[error(
+        "the voxels of this grid of {} x {} x {} take more than {} even as bricks; \
+         choose a lower resolution or a larger voxel size, or voxelize parts of the mesh with explicit grids",
+        dims[0], dims[1], dims[2], Bytes(*available)
+    )]
+    Bricks {
+        /// The grid's dimensions.
+        dims: [u32; 3],
+        /// Bytes available.
+        available: u64,
+    },
 }
 
 /// A number of bytes, printed with a binary unit.

@@ -30,6 +30,7 @@ mod ply_header;
 mod polygon;
 mod sniff;
 mod stl;
+mod stream;
 #[cfg(test)]
 mod testing;
 mod text;
@@ -39,6 +40,7 @@ mod transform;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+pub use stream::MeshStream;
 pub(crate) use text::shown;
 use trixel::{Mesh, MeshError};
 

@@ -150,19 +150,11 @@ impl<const BIG: bool> Source for Binary<'_, BIG> {
     }
 
     fn triangles(&mut self, rows: Rows, out: &mut Vec<[u32; 3]>) -> u64 {
-        let index = |bytes: [u8; 4]| if BIG { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) };
         let data = self.data.get(self.at..).unwrap_or_default();
         let most = usize::try_from(rows.count).unwrap_or(usize::MAX);
         let before = out.len();
         for row in data.chunks_exact(rows.stride).take(most) {
-            let Some(&[3, a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3]) = row[rows.offset..].first_chunk() else {
-                break;
-            };
-            let triangle = [index([a0, a1, a2, a3]), index([b0, b1, b2, b3]), index([c0, c1, c2, c3])];
-            // Negative numbers are left to those who complain of them.
-            if (triangle[0] | triangle[1] | triangle[2]) > i32::MAX as u32 {
-                break;
-            }
+            let Some(triangle) = triangle_of_row(&row[rows.offset..], BIG) else { break };
             out.push(triangle);
         }
         let read = out.len() - before;
@@ -181,6 +173,26 @@ impl<const BIG: bool> Source for Binary<'_, BIG> {
         }
         true
     }
+}
+
+/// A triangle from a count of 3 and three 32-bit indices; negative ones are left to those who complain of them.
+#[inline]
+pub(super) fn triangle_of_row(bytes: &[u8], big: bool) -> Option<[u32; 3]> {
+    let &[3, a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3] = bytes.first_chunk()? else { return None };
+    let index = |bytes: [u8; 4]| if big { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) };
+    let triangle = [index([a0, a1, a2, a3]), index([b0, b1, b2, b3]), index([c0, c1, c2, c3])];
+    ((triangle[0] | triangle[1] | triangle[2]) <= i32::MAX as u32).then_some(triangle)
+}
+
+/// The bytes of a row of faces and where in it [`triangle_of_row`] finds the triangle, where faces may be triangles.
+pub(super) fn triangle_rows(element: &Element<'_>) -> Option<(usize, usize)> {
+    let slots: Vec<FaceSlot> = element.properties.iter().map(|property| face_slot(property, false)).collect();
+    plain_triangles(element, &slots).map(|rows| (rows.stride, rows.offset))
+}
+
+/// The number at the start of `bytes`, in either byte order.
+pub(super) fn number(scalar: Scalar, bytes: &[u8], big: bool) -> Option<f64> {
+    if big { decode::<true>(scalar, bytes) } else { decode::<false>(scalar, bytes) }
 }
 
 fn read_elements<S: Source>(

@@ -12,9 +12,9 @@ use super::{Loaded, Problem, ReadOptions, Resources};
 
 const HEADER: usize = 80;
 /// Header and triangle count.
-const PREFIX: usize = HEADER + 4;
+pub(super) const PREFIX: usize = HEADER + 4;
 /// Twelve floats (normal, three corners) and two bytes of attributes.
-const TRIANGLE: usize = 50;
+pub(super) const TRIANGLE: usize = 50;
 
 pub(super) fn read(bytes: &[u8], _options: &ReadOptions, _resources: &dyn Resources) -> Result<Loaded, Problem> {
     if looks_binary_by_size(bytes) || !looks_ascii(bytes) { read_binary(bytes) } else { read_ascii(bytes) }
@@ -64,21 +64,32 @@ fn read_binary(bytes: &[u8]) -> Result<Loaded, Problem> {
         warnings.push(format!("ignored {} bytes behind the last triangle", trailing.len()));
     }
 
-    let corner = |record: &[u8; TRIANGLE], at: usize| -> [f64; 3] {
-        std::array::from_fn(|axis| {
-            let at = at + 4 * axis;
-            f64::from(f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]))
-        })
-    };
     let mut positions = Vec::with_capacity(3 * count);
     for record in data.as_chunks::<TRIANGLE>().0 {
-        positions.extend_from_slice(&[corner(record, 12), corner(record, 24), corner(record, 36)]);
+        positions.extend_from_slice(&corners(record));
     }
     let Some(vertices) = u32::try_from(positions.len()).ok() else {
         return Err(Problem::new(format!("byte {HEADER}"), "more than 1,431,655,765 triangles: split the file"));
     };
     let triangles = (0..vertices / 3).map(|triangle| [3 * triangle, 3 * triangle + 1, 3 * triangle + 2]).collect();
     Ok(Loaded { mesh: Mesh::new(positions, triangles), warnings })
+}
+
+/// The corners in a record of a binary file.
+pub(super) fn corners(record: &[u8; TRIANGLE]) -> [[f64; 3]; 3] {
+    let corner = |at: usize| -> [f64; 3] {
+        std::array::from_fn(|axis| {
+            let at = at + 4 * axis;
+            f64::from(f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]))
+        })
+    };
+    [corner(12), corner(24), corner(36)]
+}
+
+/// The number of triangles, if a file of `length` bytes that starts with `head` is surely binary.
+pub(super) fn binary_triangles(head: &[u8], length: u64) -> Option<u64> {
+    let count = claimed_triangles(head)?;
+    (length == PREFIX as u64 + count * TRIANGLE as u64).then_some(count)
 }
 
 fn read_ascii(bytes: &[u8]) -> Result<Loaded, Problem> {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use trixel::Volume;
 
 use super::WriteOptions;
-use super::deflate::BLOCK_BYTES;
+use super::deflate::{BLOCK_BYTES, Fill};
 use super::npy_header::npy_header;
 use crate::bits::expand;
 
@@ -49,17 +49,27 @@ pub(super) fn write_npy(volume: &Volume, options: &WriteOptions<'_>, out: &mut i
 /// Writes the bytes alone.
 pub(super) fn write_raw(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl Write) -> io::Result<()> {
     let blocks = DenseBlocks::new(volume);
+    write_blocks(blocks.count(), &|index, out: &mut Vec<u8>| blocks.fill(index, out), options, out)
+}
+
+/// Writes blocks in order, which `fill` makes on several threads, a bounded number at a time.
+pub(super) fn write_blocks(
+    count: usize,
+    fill: &Fill<'_>,
+    options: &WriteOptions<'_>,
+    out: &mut impl Write,
+) -> io::Result<()> {
     let mut buffers = vec![Vec::new(); rayon::current_num_threads() * 2];
-    for start in (0..blocks.count()).step_by(buffers.len()) {
-        let used = buffers.len().min(blocks.count() - start);
+    for start in (0..count).step_by(buffers.len()) {
+        let used = buffers.len().min(count - start);
         buffers[..used].par_iter_mut().enumerate().for_each(|(i, buffer)| {
             buffer.clear();
-            blocks.fill(start + i, buffer);
+            fill(start + i, buffer);
         });
         for buffer in &buffers[..used] {
             out.write_all(buffer)?;
         }
-        options.report((start + used) as u64, blocks.count() as u64);
+        options.report((start + used) as u64, count as u64);
     }
     Ok(())
 }

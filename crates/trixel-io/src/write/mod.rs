@@ -30,6 +30,7 @@ mod obj;
 mod palette;
 mod ply;
 mod raw;
+mod sparse_blocks;
 mod stl;
 mod surface;
 mod vox;
@@ -40,7 +41,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use trixel::attributes::Described;
-use trixel::{Grid, UpAxis, Volume};
+use trixel::{BrickMap, Grid, Occupancy, UpAxis, Volume};
 
 pub use crate::atomic_file::{CommitError, Staged};
 pub use crate::volume_format::VolumeFormat;
@@ -54,7 +55,8 @@ use crate::extension;
 pub struct WriteOptions<'a> {
     /// The axis of the mesh that points up: `.vox` files are turned so that it is z, `.glb` files so that it is y.
     pub up: UpAxis,
-    /// Write `.npz` as a list of the set voxels instead of a dense array.
+    /// Write `.npz` as a list of the set voxels instead of a dense array, and `.ply` as points at their centres instead of
+    /// faces.
     pub sparse: bool,
     /// What is in the voxels, for the formats that can tell: `.npz` and `.vti` write every attribute; `.vox`, `.ply`,
     /// `.obj` and `.glb` show colours, and like `.stl` leave out what the alpha test cut out.
@@ -199,6 +201,7 @@ pub fn write_volume(path: &Path, volume: &Volume, options: &WriteOptions<'_>) ->
     };
     let volume = shown.as_ref().unwrap_or(volume);
     match format {
+        _ if options.sparse && format.takes_bricks() => write_voxels(format, volume, options, out),
         VolumeFormat::Npz => npz::write(volume, options, out).map_err(Failure::Io),
         VolumeFormat::Npy => dense::write_npy(volume, options, out).map_err(Failure::Io),
         VolumeFormat::Binvox => binvox::write(volume, options, out).map_err(Failure::Io),
@@ -221,6 +224,42 @@ pub fn write_volume(path: &Path, volume: &Volume, options: &WriteOptions<'_>) ->
     }
     options.report(1, 1);
     Ok(staged)
+}
+
+/// [`write_volume`] for bricks, in the formats that take them (see [`VolumeFormat::takes_bricks`]): `.npz` as `indices`,
+/// `.ply` as points, `.vox`.
+///
+/// # Errors
+/// As [`write_volume`]; other formats are refused.
+pub fn write_bricks(path: &Path, bricks: &BrickMap, options: &WriteOptions<'_>) -> Result<Staged, WriteError> {
+    let Some(format) = VolumeFormat::from_path(path) else {
+        return Err(WriteError::UnknownFormat { path: path.to_owned() });
+    };
+    check_limits(format, bricks.grid()).map_err(|problem| Failure::Limit(problem).at(path))?;
+    let mut file = open(path)?;
+    write_voxels(format, bricks, options, &mut file).map_err(|failure| failure.at(path))?;
+    options.report(1, 1);
+    stage(file, path)
+}
+
+/// Writes voxels that need not be dense.
+fn write_voxels(
+    format: VolumeFormat,
+    voxels: &impl Occupancy,
+    options: &WriteOptions<'_>,
+    out: &mut AtomicFile,
+) -> Result<(), Failure> {
+    match format {
+        VolumeFormat::Npz => npz::write_sparse(voxels, options, out).map_err(Failure::Io),
+        VolumeFormat::Ply => ply::write_points(voxels, options, out).map_err(Failure::Io),
+        VolumeFormat::Vox => vox::write(voxels, options, out),
+        _ => Err(Failure::Limit(format!(
+            ".{} files hold whole grids, and this grid is voxelized into bricks because it is too large or because \
+             of --sparse; write .{}",
+            format.extension(),
+            extension::list(VolumeFormat::ALL.into_iter().filter(|f| f.takes_bricks()).map(VolumeFormat::extension))
+        ))),
+    }
 }
 
 fn check_limits(format: VolumeFormat, grid: &Grid) -> Result<(), String> {

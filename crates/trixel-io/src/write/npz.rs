@@ -6,12 +6,13 @@
 
 use std::io::{self, Seek, SeekFrom, Write};
 
-use trixel::{Volume, set_bits};
+use trixel::{Grid, Occupancy, Volume};
 
 use super::deflate::{Fill, Stream};
 use super::dense::DenseBlocks;
 use super::little_endian::{put16, put32, put64};
 use super::npy_header::npy_header;
+use super::sparse_blocks::SparseBlocks;
 use super::{WriteOptions, columns};
 
 /// The time stamp of every entry, the earliest there is (1980-01-01), so that equal volumes give equal files.
@@ -217,65 +218,48 @@ fn saturate(value: u64) -> u32 {
     u32::try_from(value).unwrap_or(u32::MAX)
 }
 
-/// Writes `occupancy` (bool, `[x, y, z]`), `origin` and `voxel_size` (f64[3]); or, sparse, `indices` (i32, N x 3, sorted
-/// by x, y, z) and `dims` (i32[3]) in place of `occupancy`. Attributes follow under their names.
+/// Writes `occupancy` (bool, `[x, y, z]`), `origin` and `voxel_size` (f64[3]). Attributes follow under their names.
 pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut (impl Write + Seek)) -> io::Result<()> {
-    let grid = volume.grid();
     let mut npz = NpzWriter::new(out);
-    if options.sparse {
-        let blocks = SparseBlocks::new(volume);
-        let mut progress = |done| options.report(done as u64, blocks.count() as u64);
-        let fill = |index, out: &mut Vec<u8>| blocks.fill(index, out);
-        npz.array("indices", "<i4", &[volume.count(), 3], blocks.count(), &fill, &mut progress)?;
-        let dims = |_, out: &mut Vec<u8>| out.extend(grid.dims().iter().flat_map(|n| n.to_le_bytes()));
-        npz.array("dims", "<i4", &[3], 1, &dims, &mut |_| {})?;
-    } else {
-        let blocks = DenseBlocks::new(volume);
-        let mut progress = |done| options.report(done as u64, blocks.count() as u64);
-        let fill = |index, out: &mut Vec<u8>| blocks.fill(index, out);
-        npz.array("occupancy", "|b1", &grid.dims().map(u64::from), blocks.count(), &fill, &mut progress)?;
-    }
+    let blocks = DenseBlocks::new(volume);
+    let mut progress = |done| options.report(done as u64, blocks.count() as u64);
+    let fill = |index, out: &mut Vec<u8>| blocks.fill(index, out);
+    npz.array("occupancy", "|b1", &volume.grid().dims().map(u64::from), blocks.count(), &fill, &mut progress)?;
+    finish(npz, volume.grid(), options, false)
+}
+
+/// Writes `indices` (i32, N x 3, sorted by x, y, z), `dims` (i32[3]), `origin` and `voxel_size` (f64[3]). Attributes follow
+/// under their names.
+pub(super) fn write_sparse(
+    voxels: &impl Occupancy,
+    options: &WriteOptions<'_>,
+    out: &mut (impl Write + Seek),
+) -> io::Result<()> {
+    let grid = voxels.grid();
+    let mut npz = NpzWriter::new(out);
+    let blocks = SparseBlocks::new(voxels);
+    let mut progress = |done| options.report(done as u64, blocks.count() as u64);
+    let fill = |index, out: &mut Vec<u8>| {
+        blocks.for_each(index, |voxel| out.extend_from_slice(voxel.map(u32::to_le_bytes).as_flattened()));
+    };
+    npz.array("indices", "<i4", &[blocks.voxel_count(), 3], blocks.count(), &fill, &mut progress)?;
+    let dims = |_, out: &mut Vec<u8>| out.extend(grid.dims().iter().flat_map(|n| n.to_le_bytes()));
+    npz.array("dims", "<i4", &[3], 1, &dims, &mut |_| {})?;
+    finish(npz, grid, options, true)
+}
+
+fn finish(
+    mut npz: NpzWriter<impl Write + Seek>,
+    grid: &Grid,
+    options: &WriteOptions<'_>,
+    sparse: bool,
+) -> io::Result<()> {
     if let Some(described) = options.described {
-        columns::write(&described, options.sparse, &mut npz)?;
+        columns::write(&described, sparse, &mut npz)?;
     }
     npz.floats("origin", &grid.origin())?;
     npz.floats("voxel_size", &grid.voxel_size())?;
     npz.finish().map(drop)
-}
-
-/// The indices of the set voxels, cut by columns so that no block is large even where every voxel is set.
-struct SparseBlocks<'a> {
-    volume: &'a Volume,
-    columns: usize,
-}
-
-impl<'a> SparseBlocks<'a> {
-    /// Voxels of a block's columns; a set one takes 12 bytes.
-    const VOXELS: usize = 1 << 17;
-
-    fn new(volume: &'a Volume) -> Self {
-        Self { volume, columns: (Self::VOXELS / volume.grid().dims()[2] as usize).max(1) }
-    }
-
-    fn count(&self) -> usize {
-        (self.volume.words().len() / self.volume.column_words()).div_ceil(self.columns)
-    }
-
-    fn fill(&self, index: usize, out: &mut Vec<u8>) {
-        let column_words = self.volume.column_words();
-        let ny = self.volume.grid().dims()[1] as usize;
-        let first = index * self.columns;
-        let words = self.volume.words().chunks(self.columns * column_words).nth(index).unwrap_or_default();
-        for (column, words) in (first..).zip(words.chunks(column_words)) {
-            // Both are below 2^15.
-            let [x, y] = [column / ny, column % ny].map(|i| u32::try_from(i).unwrap_or(u32::MAX).to_le_bytes());
-            for z in set_bits(words) {
-                out.extend(x);
-                out.extend(y);
-                out.extend(z.to_le_bytes());
-            }
-        }
-    }
 }
 
 #[cfg(test)]

@@ -8,8 +8,8 @@
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
-use trixel::Volume;
 use trixel::attributes::Described;
+use trixel::{Occupancy, set_bits};
 
 /// The most colours of a palette; voxels name them by a byte from 1 on.
 const MOST_COLORS: usize = 255;
@@ -28,11 +28,13 @@ type Weighted = ([u8; 3], u64);
 impl Palette {
     /// The palette of the voxels of `volume`, which may be part of what is described. Colours are their own as long as
     /// there are at most 255 of them.
-    pub(super) fn new(volume: &Volume, described: &Described<'_>) -> Self {
+    pub(super) fn new(volume: &impl Occupancy, described: &Described<'_>) -> Self {
         let mut counts: BTreeMap<[u8; 3], u64> = BTreeMap::new();
-        for voxel in volume.iter() {
-            *counts.entry(opaque(described.color(voxel))).or_default() += 1;
-        }
+        volume.for_each_word(&volume.grid().dims().map(|n| 0..n), |[x, y, z], word| {
+            for i in set_bits(&[word]) {
+                *counts.entry(opaque(described.color([x, y, z + i]))).or_default() += 1;
+            }
+        });
         Self::of(&counts)
     }
 

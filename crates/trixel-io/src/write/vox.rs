@@ -13,7 +13,7 @@ use std::io::{self, Write};
 use std::ops::Range;
 
 use trixel::attributes::Described;
-use trixel::{Grid, UpAxis, Volume, WORD_BITS};
+use trixel::{Grid, Occupancy, UpAxis, WORD_BITS};
 
 use super::little_endian::put32;
 use super::palette::Palette;
@@ -45,8 +45,8 @@ struct Colors<'a> {
 }
 
 /// The volume as the editor shall see it.
-struct Scene<'a> {
-    volume: &'a Volume,
+struct Scene<'a, O> {
+    volume: &'a O,
     colors: Option<Colors<'a>>,
     axes: [SceneAxis; 3],
 }
@@ -80,7 +80,7 @@ pub(super) fn check(grid: &Grid) -> Result<(), String> {
 }
 
 /// Writes the volume, whose grid [`check`] has passed.
-pub(super) fn write(volume: &Volume, options: &WriteOptions<'_>, out: &mut impl Write) -> Result<(), Failure> {
+pub(super) fn write(volume: &impl Occupancy, options: &WriteOptions<'_>, out: &mut impl Write) -> Result<(), Failure> {
     let colors = options.described.filter(Described::has_colors);
     let colors = colors.map(|described| Colors { palette: Palette::new(volume, &described), described });
     let scene = Scene { volume, colors, axes: scene_axes(options.up) };
@@ -118,7 +118,7 @@ impl Part {
     }
 }
 
-impl Scene<'_> {
+impl<O: Occupancy> Scene<'_, O> {
     fn dims(&self) -> [u32; 3] {
         self.axes.map(|axis| self.volume.grid().dims()[axis.from])
     }
@@ -133,7 +133,7 @@ impl Scene<'_> {
                 for x in ranges(dims[0]) {
                     let mut part = Part { range: [x.clone(), y.clone(), z.clone()], voxels: 0 };
                     let mut voxels = 0;
-                    self.for_each_word(&part, |_, _, bits| voxels += u64::from(bits.count_ones()));
+                    self.for_each_word(&part, |_, bits| voxels += u64::from(bits.count_ones()));
                     if voxels > 0 {
                         part.voxels = voxels;
                         parts.push(part);
@@ -144,27 +144,15 @@ impl Scene<'_> {
         parts
     }
 
-    /// Calls `visit` with the volume's column, the first z and the bits of every word inside a part.
-    fn for_each_word(&self, part: &Part, mut visit: impl FnMut([u32; 2], u32, u64)) {
+    /// Calls `visit` with the volume's words inside a part.
+    fn for_each_word(&self, part: &Part, visit: impl FnMut([u32; 3], u64)) {
         // The part in the volume's coordinates.
         let mut range: [Range<u32>; 3] = Default::default();
         for (axis, along) in self.axes.iter().zip(&part.range) {
             let n = self.volume.grid().dims()[axis.from];
             range[axis.from] = if axis.reversed { n - along.end..n - along.start } else { along.clone() };
         }
-        let [xs, ys, zs] = range;
-        for x in xs {
-            for y in ys.clone() {
-                for (start, &word) in (0..).step_by(WORD_BITS as usize).zip(self.volume.column(x, y)) {
-                    if start + WORD_BITS <= zs.start || start >= zs.end || word == 0 {
-                        continue;
-                    }
-                    let from = u64::MAX << zs.start.saturating_sub(start);
-                    let to = u64::MAX >> (start + WORD_BITS).saturating_sub(zs.end);
-                    visit([x, y], start, word & from & to);
-                }
-            }
-        }
+        self.volume.for_each_word(&range, visit);
     }
 
     fn write_model(&self, part: &Part, out: &mut impl Write) -> io::Result<()> {
@@ -178,12 +166,12 @@ impl Scene<'_> {
         let dims = self.volume.grid().dims();
         let mut result = Ok(());
         let mut records = [0; WORD_BITS as usize * 4];
-        self.for_each_word(part, |[x, y], start, bits| {
+        self.for_each_word(part, |voxel, bits| {
             // A record is x, y and z in the model, each below its side of 256, and the colour: as one little-endian
             // number, whose change from one voxel of the column to the next is the same for all.
             let (mut first, mut step) = (u32::from(COLOR) << 24, 0u32);
             for (place, (axis, range)) in self.axes.iter().zip(&part.range).enumerate() {
-                let (n, at) = (dims[axis.from], [x, y, start][axis.from]);
+                let (n, at) = (dims[axis.from], voxel[axis.from]);
                 // The word may start before the part; what is too little or too much cancels out.
                 let at = if axis.reversed { n.wrapping_sub(1 + at) } else { at }.wrapping_sub(range.start);
                 first = first.wrapping_add(at << (8 * place));
@@ -199,7 +187,8 @@ impl Scene<'_> {
                 }
                 *record = first.wrapping_add(step.wrapping_mul(rest.trailing_zeros())).to_le_bytes();
                 if let Some(Colors { described, palette }) = &self.colors {
-                    record[3] = palette.number(described.color([x, y, start + rest.trailing_zeros()]));
+                    let [x, y, z] = voxel;
+                    record[3] = palette.number(described.color([x, y, z + rest.trailing_zeros()]));
                 }
                 rest &= rest - 1;
                 length += record.len();

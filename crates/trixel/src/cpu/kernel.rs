@@ -15,7 +15,8 @@ use fearless_simd::Simd;
 use super::number::SMALL_EXTENT;
 use super::rule::{Rule, SurfaceRule};
 use super::sink::Sink;
-use super::slabs::Selected;
+use super::tiny::TinyBox;
+use super::triangles::Selected;
 use super::{large, rows, tiny};
 use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
 
@@ -46,18 +47,18 @@ impl VoxelBox {
 
     /// Voxels along each axis, less one.
     #[inline(always)]
-    fn extent(&self) -> [i64; 3] {
+    pub(super) fn extent(&self) -> [i64; 3] {
         [self.high[0] - self.low[0], self.high[1] - self.low[1], self.high[2] - self.low[2]]
     }
 
-    /// Whether the box is inside `other`.
+    /// Whether the box meets `other`, and lies inside it along z.
     #[inline(always)]
-    fn is_inside(&self, other: &Self) -> bool {
-        (self.low[0] >= other.low[0])
-            & (self.low[1] >= other.low[1])
+    fn meets_with_all_of_z(&self, other: &Self) -> bool {
+        (self.high[0] >= other.low[0])
+            & (self.high[1] >= other.low[1])
             & (self.low[2] >= other.low[2])
-            & (self.high[0] <= other.high[0])
-            & (self.high[1] <= other.high[1])
+            & (self.low[0] <= other.high[0])
+            & (self.low[1] <= other.high[1])
             & (self.high[2] <= other.high[2])
     }
 }
@@ -85,8 +86,8 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
         |triangle| {
             let around = VoxelBox::around(triangle);
             let extent = around.extent();
-            if extent[0] | extent[1] | extent[2] <= 3 && around.is_inside(clip) {
-                tiny.push(simd, rule, triangle, around.low, extent, sink);
+            if extent[0] | extent[1] | extent[2] <= 3 && around.meets_with_all_of_z(clip) {
+                tiny.push(simd, rule, triangle, &TinyBox::new(&around, clip), sink);
                 return;
             }
             let Some(clipped) = around.clipped(clip) else { return };
@@ -132,35 +133,35 @@ impl Tiny {
         }
     }
 
-    /// Takes a triangle whose box, at `low`, has at most four voxels along each axis and lies inside the clip.
+    /// Takes a triangle whose box has at most four voxels along each axis.
     #[inline(always)]
     fn push<V: Simd, R: SurfaceRule>(
         &mut self,
         simd: V,
         rule: &R,
         triangle: &[[i64; 3]; 3],
-        low: [i64; 3],
-        extent: [i64; 3],
+        tiny: &TinyBox,
         sink: &mut impl Sink,
     ) {
+        let extent = tiny.extent;
         let longest = extent[0].max(extent[1]).max(extent[2]);
         if R::TOUCH_IS_ENOUGH {
             let axes = extent[0].min(1) + extent[1].min(1) + extent[2].min(1);
             if axes <= 1 {
                 // Strictly inside a row of voxels, and connected: it meets them all. Bits of a cube of four.
                 let bits = row_bits(extent[2], 1) | row_bits(extent[1], 4) | row_bits(extent[0], 16);
-                sink.cube::<4>(low, bits);
+                sink.cube::<4>(tiny.low, bits & tiny.keep::<4>());
                 return;
             }
             if axes == 2 {
                 if longest <= 1 {
-                    if self.flats2.push(triangle, low, extent) {
+                    if self.flats2.push(triangle, tiny) {
                         simd.vectorize(
                             #[inline(always)]
                             || self.flats2.flush(simd, rule, sink),
                         );
                     }
-                } else if self.flats4.push(triangle, low, extent) {
+                } else if self.flats4.push(triangle, tiny) {
                     simd.vectorize(
                         #[inline(always)]
                         || self.flats4.flush(simd, rule, sink),
@@ -170,20 +171,20 @@ impl Tiny {
             }
         }
         if longest <= 1 {
-            if self.cubes2.push(triangle, low, extent) {
+            if self.cubes2.push(triangle, tiny) {
                 simd.vectorize(
                     #[inline(always)]
                     || self.cubes2.flush(simd, rule, sink),
                 );
             }
         } else if longest <= 2 {
-            if self.cubes3.push(triangle, low, extent) {
+            if self.cubes3.push(triangle, tiny) {
                 simd.vectorize(
                     #[inline(always)]
                     || self.cubes3.flush(simd, rule, sink),
                 );
             }
-        } else if self.cubes4.push(triangle, low, extent) {
+        } else if self.cubes4.push(triangle, tiny) {
             simd.vectorize(
                 #[inline(always)]
                 || self.cubes4.flush(simd, rule, sink),

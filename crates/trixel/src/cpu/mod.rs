@@ -8,27 +8,39 @@
 //! - `fragments`: the voxels of each triangle by itself, for attributes
 //! - `number`: exact integers and floor lines
 //! - `sink`: runs into bits, toggles into parity
-//! - `slabs`: the grid cut along x, one piece a task, so that threads never share a word
+//! - `painter`: a mode and the instructions, together
+//! - `triangles`: which triangles, and their corners
+//! - `slabs`: a dense grid cut along x, one piece a task, so that threads never share a word
+//! - `pillars`: a sparse grid cut into pillars of bricks
 
 pub(crate) mod fragments;
 mod instructions;
 mod kernel;
 mod large;
 pub(crate) mod number;
+mod painter;
+mod pillars;
 mod rows;
 mod rule;
 mod setup;
 mod sink;
 mod slabs;
 mod tiny;
+mod triangles;
 
 pub use instructions::Instructions;
+pub use pillars::BinnedMesh;
+
+use std::ops::Range;
+
+use painter::Painter;
 
 use crate::backend::{Backend, Error};
+use crate::bricks::BrickMap;
 use crate::job::{Job, Strategy};
 use crate::lattice::LatticeMesh;
-use crate::mode::Mode;
-use crate::volume::Volume;
+use crate::mesh::MeshError;
+use crate::volume::{Volume, VolumeError};
 
 /// Voxelizes on the CPU. The result is the same for any number of threads.
 #[derive(Debug, Default)]
@@ -74,6 +86,62 @@ impl CpuBackend {
         1
     }
 
+    /// The voxels of `mesh`, which was snapped to the job's grid, as bricks: for grids whose dense volume would not fit
+    /// the memory. Memory and time follow the surface (mode `solid`: too, as the inside takes runs of whole bricks).
+    ///
+    /// # Errors
+    /// When the strategy is another backend's, the mesh has too many triangles, or the bricks take more than `available`
+    /// bytes.
+    ///
+    /// ```
+    /// use trixel::{CpuBackend, Grid, Job, Mode, lattice::LatticeMesh, scene};
+    /// let mesh = scene::build("sphere:64")?;
+    /// // Dense, this grid would take 64 GiB.
+    /// let job = Job::new(Grid::fit(&mesh.bounds().ok_or("empty")?, 8192)?, Mode::Solid);
+    /// let map = CpuBackend::default().voxelize_bricks(&LatticeMesh::snap(&mesh, job.grid())?, &job, None)?;
+    /// assert!(map.get([4096; 3]) && !map.get([0; 3]));
+    /// assert!(map.bytes() < 512 << 20);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn voxelize_bricks(
+        &self,
+        mesh: &LatticeMesh<'_>,
+        job: &Job,
+        available: Option<u64>,
+    ) -> Result<BrickMap, Error> {
+        let [px, py] = BrickMap::pillars_of(job.grid());
+        let binned = self.bin(mesh, job, 0..px)?;
+        let available = available.unwrap_or(u64::MAX).saturating_sub(binned.bytes());
+        let refused = VolumeError::Bricks { dims: job.grid().dims(), available };
+        Ok(self.install(|| binned.voxelize_within(0..px, 0..py, available)).ok_or(refused)?)
+    }
+
+    /// Sorts the triangles of `mesh`, which was snapped to the job's grid, into the pillars `[x, y]` with x in `layers`
+    /// (see [`BrickMap::pillars_of`]), so that pillars can be voxelized piece by piece.
+    ///
+    /// # Errors
+    /// As [`CpuBackend::voxelize_bricks`], memory aside.
+    pub fn bin<'a>(&self, mesh: &'a LatticeMesh<'a>, job: &Job, layers: Range<u32>) -> Result<BinnedMesh<'a>, Error> {
+        self.strategy(job)?;
+        if u32::try_from(mesh.triangles.len()).is_err() {
+            return Err(MeshError::TooManyTriangles(mesh.triangles.len()).into());
+        }
+        let painter = Painter::new(self.instructions.level(), job);
+        Ok(self.install(|| BinnedMesh::new(painter, mesh, *job.grid(), layers)))
+    }
+
+    /// The strategy that a job asks for.
+    fn strategy(&self, job: &Job) -> Result<Strategy, Error> {
+        let strategy = match job.strategy() {
+            Strategy::Auto => Strategy::ColumnRuns,
+            strategy => strategy,
+        };
+        if !self.strategies().contains(&strategy) {
+            return Err(Error::Strategy { backend: self.name(), strategy, has: self.strategies() });
+        }
+        Ok(strategy)
+    }
+
     /// Runs `work` where its parallel loops use this backend's threads.
     pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
         #[cfg(feature = "threads")]
@@ -94,24 +162,12 @@ impl Backend for CpuBackend {
     }
 
     fn voxelize(&self, mesh: &LatticeMesh<'_>, job: &Job, volume: &mut Volume) -> Result<Strategy, Error> {
-        let strategy = match job.strategy() {
-            Strategy::Auto => Strategy::ColumnRuns,
-            strategy => strategy,
-        };
-        if !self.strategies().contains(&strategy) {
-            return Err(Error::Strategy { backend: self.name(), strategy, has: self.strategies() });
-        }
+        let strategy = self.strategy(job)?;
         if volume.grid() != job.grid() {
             return Err(Error::GridMismatch);
         }
-        let level = self.instructions.level();
-        let overlap = i64::from(job.overlap_steps());
-        self.install(|| match job.mode() {
-            Mode::Conservative => slabs::surface(level, &rule::Conservative, mesh, volume),
-            Mode::Thin => slabs::surface(level, &rule::Thin, mesh, volume),
-            Mode::Sliced => slabs::slice(level, &rule::Sliced { overlap }, mesh, volume),
-            Mode::Solid => slabs::fill(level, mesh, volume),
-        });
+        let painter = Painter::new(self.instructions.level(), job);
+        self.install(|| slabs::voxelize(&painter, mesh, volume));
         Ok(strategy)
     }
 }

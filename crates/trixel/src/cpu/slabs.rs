@@ -3,72 +3,21 @@
 //! With one thread there is one slab and no sorting. With more, triangles are first sorted into the slabs that they
 //! meet; slabs are cut so that each holds about the same work, and there are several a thread to level the rest.
 
-use fearless_simd::{Level, dispatch};
-
-use super::kernel::{self, VoxelBox};
-use super::rule::{Sliced, Solid, SurfaceRule};
-use super::sink::{SetRuns, Slab, ToggleRuns, prefix_xor};
-use crate::lattice::{LatticeMesh, LatticePositions};
+use super::kernel::VoxelBox;
+use super::painter::Painter;
+use super::sink::{Slab, prefix_xor};
+use super::triangles::Selected;
+use crate::lattice::LatticeMesh;
 use crate::volume::Volume;
 
-/// Some triangles of a mesh, one after the other.
-#[derive(Clone, Copy)]
-pub(super) struct Selected<'a> {
-    mesh: &'a LatticeMesh<'a>,
-    /// The triangles, or `None` for all.
-    indices: Option<&'a [u32]>,
-}
-
-impl Selected<'_> {
-    /// Calls `each` with the corners of every triangle.
-    #[inline(always)]
-    pub(super) fn for_each(&self, mut each: impl FnMut(&[[i64; 3]; 3])) {
-        let count = self.indices.map_or(self.mesh.triangles.len(), <[u32]>::len);
-        // One loop for both, because `each` is a whole kernel.
-        for i in 0..count {
-            let triangle = self.indices.map_or(i, |indices| indices[i] as usize);
-            each(&corners(self.mesh, self.mesh.triangles[triangle]));
-        }
-    }
-}
-
-/// The corners of a triangle.
-#[inline(always)]
-fn corners(mesh: &LatticeMesh<'_>, [a, b, c]: [u32; 3]) -> [[i64; 3]; 3] {
-    let corner = |vertex: u32| match &mesh.positions {
-        LatticePositions::Narrow(positions) => {
-            let [x, y, z] = positions[vertex as usize];
-            [i64::from(x), i64::from(y), i64::from(z)]
-        }
-        LatticePositions::Wide(positions) => positions[vertex as usize],
-    };
-    [corner(a), corner(b), corner(c)]
-}
-
-/// Clears the volume and sets the voxels of a surface mode.
-pub(super) fn surface<R: SurfaceRule>(level: Level, rule: &R, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
-    for_each_slab(mesh, volume, |slab, clip, triangles| {
-        let mut sink = SetRuns(slab);
-        dispatch!(level, simd => kernel::surface(simd, rule, Selected { mesh, indices: triangles }, clip, &mut sink));
-    });
-}
-
-/// Clears the volume and sets the voxels of [`crate::Mode::Sliced`].
-pub(super) fn slice(level: Level, rule: &Sliced, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
-    for_each_slab(mesh, volume, |slab, clip, triangles| {
-        let mut sink = SetRuns(slab);
-        dispatch!(level, simd => kernel::centres(simd, rule, Selected { mesh, indices: triangles }, clip, &mut sink));
-    });
-}
-
-/// Clears the volume and sets the voxels inside the mesh.
-pub(super) fn fill(level: Level, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
+/// Clears the volume and sets the voxels of the painter's mode.
+pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
     let nz = volume.grid().dims()[2];
-    for_each_slab(mesh, volume, |slab, clip, triangles| {
-        let column_words = slab.column_words;
-        let mut sink = ToggleRuns(slab);
-        dispatch!(level, simd => kernel::centres(simd, &Solid, Selected { mesh, indices: triangles }, clip, &mut sink));
-        prefix_xor(sink.0.words, column_words, nz);
+    for_each_slab(mesh, volume, |mut slab, clip, indices| {
+        painter.paint(Selected { mesh, indices }, clip, slab.reborrow());
+        if painter.toggles() {
+            prefix_xor(slab.words, slab.column_words, nz);
+        }
     });
 }
 
@@ -99,7 +48,7 @@ fn for_each_slab(
     let dims = volume.grid().dims();
     let (columns, column_words) = (dims[1] as usize, volume.column_words());
     volume.clear();
-    let slab = Slab { words: volume.words_mut(), x_start: 0, columns, column_words };
+    let slab = Slab { words: volume.words_mut(), start: [0; 3], columns, column_words };
     work(slab, &clip_of(dims, 0..dims[0]), None);
 }
 
@@ -107,11 +56,14 @@ fn for_each_slab(
 mod parallel {
     use rayon::prelude::*;
 
-    use super::{LatticeMesh, Slab, VoxelBox, clip_of, corners};
+    use super::{LatticeMesh, Slab, VoxelBox, clip_of};
+    use crate::cpu::triangles::corners;
     use crate::volume::Volume;
 
     /// Triangles sorted by one task.
     const CHUNK: usize = 1 << 14;
+    /// Triangles that are looked at to cut the grid.
+    const SAMPLES: usize = 1 << 13;
 
     /// The range of x that a triangle's box meets inside the grid, and the work that it stands for.
     #[inline(always)]
@@ -171,7 +123,7 @@ mod parallel {
                 words.fill(0);
             }
             let clip = clip_of(dims, range.clone());
-            let slab = Slab { words, x_start: i64::from(range.start), columns, column_words };
+            let slab = Slab { words, start: [i64::from(range.start), 0, 0], columns, column_words };
             work(slab, &clip, Some(&list));
         });
     }
@@ -180,26 +132,19 @@ mod parallel {
     fn cut(mesh: &LatticeMesh<'_>, dims: [u32; 3], pieces: usize) -> Vec<u32> {
         let nx = dims[0] as usize;
         let [nx_signed, ny, _] = dims.map(i64::from);
+        // Where the work is, is known well enough from some of the triangles.
+        let every = (mesh.triangles.len() / SAMPLES).max(1);
         // Differences of the work at each x, so that a triangle costs two additions however long it is.
-        let differences = mesh
-            .triangles
-            .par_chunks(CHUNK)
-            .fold(
-                || vec![0i64; nx + 1],
-                |mut differences, chunk| {
-                    for &triangle in chunk {
-                        let corners = corners(mesh, triangle);
-                        if let Some([low, high]) = x_range(&corners, nx_signed) {
-                            #[expect(clippy::cast_possible_wrap, reason = "at most the grid's columns along y")]
-                            let weight = weight_per_x(&corners, ny) as i64;
-                            differences[low] += weight;
-                            differences[high + 1] -= weight;
-                        }
-                    }
-                    differences
-                },
-            )
-            .reduce(|| vec![0i64; nx + 1], |a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect());
+        let mut differences = vec![0i64; nx + 1];
+        for &triangle in mesh.triangles.iter().step_by(every) {
+            let corners = corners(mesh, triangle);
+            if let Some([low, high]) = x_range(&corners, nx_signed) {
+                #[expect(clippy::cast_possible_wrap, reason = "at most the grid's columns along y, and the triangles")]
+                let weight = (weight_per_x(&corners, ny) * every as u64) as i64;
+                differences[low] += weight;
+                differences[high + 1] -= weight;
+            }
+        }
         // Empty layers still have to be cleared and filled.
         let per_layer = 1 + ny / 64;
         let mut at_x = 0;

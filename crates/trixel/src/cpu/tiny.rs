@@ -5,6 +5,7 @@
 
 use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
 
+use super::kernel::VoxelBox;
 use super::rule::SurfaceRule;
 use super::sink::Sink;
 use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
@@ -34,20 +35,62 @@ struct Boxes {
     low: [[i64; 3]; LANES],
     /// Voxels along each axis, less one.
     extent: [[i64; 3]; LANES],
+    /// The voxels of the box inside the clip, as bits of a cube.
+    keep: [u64; LANES],
     count: usize,
 }
 
 impl Boxes {
-    const EMPTY: Self = Self { low: [[0; 3]; LANES], extent: [[0; 3]; LANES], count: 0 };
+    const EMPTY: Self = Self { low: [[0; 3]; LANES], extent: [[0; 3]; LANES], keep: [0; LANES], count: 0 };
 
     /// Adds a box and gives its lane.
     #[inline(always)]
-    fn push(&mut self, low: [i64; 3], extent: [i64; 3]) -> usize {
+    fn push(&mut self, tiny: &TinyBox, keep: u64) -> usize {
         let lane = self.count % LANES;
-        self.low[lane] = low;
-        self.extent[lane] = extent;
+        self.low[lane] = tiny.low;
+        self.extent[lane] = tiny.extent;
+        self.keep[lane] = keep;
         self.count += 1;
         lane
+    }
+}
+
+/// The voxel box of a tiny triangle.
+pub(super) struct TinyBox {
+    pub(super) low: [i64; 3],
+    /// Voxels along each axis, less one: at most 3.
+    pub(super) extent: [i64; 3],
+    /// The first and the last voxel from `low` on that are inside the clip.
+    kept: [[i64; 3]; 2],
+}
+
+impl TinyBox {
+    /// A box that meets `clip`.
+    #[inline(always)]
+    pub(super) fn new(around: &VoxelBox, clip: &VoxelBox) -> Self {
+        let (low, extent) = (around.low, around.extent());
+        let from = |i: usize| (clip.low[i] - low[i]).max(0);
+        let to = |i: usize| (clip.high[i] - low[i]).min(extent[i]);
+        Self { low, extent, kept: [[from(0), from(1), from(2)], [to(0), to(1), to(2)]] }
+    }
+
+    /// The voxels inside the clip, in the bits of a cube.
+    #[inline(always)]
+    pub(super) fn keep<const SIDE: usize>(&self) -> u64 {
+        /// Bit 0 of each of `count` groups of `width` bits.
+        const fn every(width: usize, count: usize) -> u64 {
+            let mut mask = 0;
+            let mut i = 0;
+            while i < count {
+                mask |= 1 << (width * i);
+                i += 1;
+            }
+            mask
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to SIDE - 1")]
+        let [from, to] = [self.kept[0].map(|i| i as usize), self.kept[1].map(|i| i as usize + 1)];
+        let range = |axis: usize, step: usize| row_mask(step * to[axis]) & !row_mask(step * from[axis]);
+        range(0, SIDE * SIDE) & (range(1, SIDE) * every(SIDE * SIDE, SIDE)) & (range(2, 1) * every(SIDE, SIDE * SIDE))
     }
 }
 
@@ -65,11 +108,11 @@ impl<const SIDE: usize> Cubes<SIDE> {
 
     /// Adds a triangle; `true` when the batch is full.
     #[inline(always)]
-    pub(super) fn push(&mut self, triangle: &[[i64; 3]; 3], low: [i64; 3], extent: [i64; 3]) -> bool {
-        let lane = self.boxes.push(low, extent);
+    pub(super) fn push(&mut self, triangle: &[[i64; 3]; 3], tiny: &TinyBox) -> bool {
+        let lane = self.boxes.push(tiny, tiny.keep::<SIDE>());
         for k in 0..3 {
             for i in 0..3 {
-                self.corners[3 * k + i][lane] = local(triangle[k][i], low[i]);
+                self.corners[3 * k + i][lane] = local(triangle[k][i], tiny.low[i]);
             }
         }
         self.boxes.count == LANES
@@ -113,8 +156,7 @@ impl<const SIDE: usize> Cubes<SIDE> {
         }
         let voxels_of_lane = transpose(&lanes_of_voxel, SIDE * SIDE * SIDE);
         for lane in 0..self.boxes.count {
-            let inside = within::<SIDE>(self.boxes.extent[lane]);
-            sink.cube::<SIDE>(self.boxes.low[lane], voxels_of_lane[lane] & inside);
+            sink.cube::<SIDE>(self.boxes.low[lane], voxels_of_lane[lane] & self.boxes.keep[lane]);
         }
         self.boxes.count = 0;
     }
@@ -127,12 +169,12 @@ impl<const SIDE: usize> Flats<SIDE> {
 
     /// Adds a triangle whose box is one voxel thick along one axis; `true` when the batch is full.
     #[inline(always)]
-    pub(super) fn push(&mut self, triangle: &[[i64; 3]; 3], low: [i64; 3], extent: [i64; 3]) -> bool {
-        let lane = self.boxes.push(low, extent);
-        let (a, b) = flat_axes(extent);
+    pub(super) fn push(&mut self, triangle: &[[i64; 3]; 3], tiny: &TinyBox) -> bool {
+        let lane = self.boxes.push(tiny, tiny.keep::<SIDE>());
+        let (a, b) = flat_axes(tiny.extent);
         for k in 0..3 {
-            self.corners[2 * k][lane] = local(triangle[k][a], low[a]);
-            self.corners[2 * k + 1][lane] = local(triangle[k][b], low[b]);
+            self.corners[2 * k][lane] = local(triangle[k][a], tiny.low[a]);
+            self.corners[2 * k + 1][lane] = local(triangle[k][b], tiny.low[b]);
         }
         self.boxes.count == LANES
     }
@@ -157,9 +199,8 @@ impl<const SIDE: usize> Flats<SIDE> {
         }
         let voxels_of_lane = transpose(&lanes_of_voxel, SIDE * SIDE);
         for lane in 0..self.boxes.count {
-            let extent = self.boxes.extent[lane];
-            let cube = spread_flat::<SIDE>(voxels_of_lane[lane], extent) & within::<SIDE>(extent);
-            sink.cube::<SIDE>(self.boxes.low[lane], cube);
+            let cube = spread_flat::<SIDE>(voxels_of_lane[lane], self.boxes.extent[lane]);
+            sink.cube::<SIDE>(self.boxes.low[lane], cube & self.boxes.keep[lane]);
         }
         self.boxes.count = 0;
     }
@@ -234,27 +275,6 @@ fn spread_flat<const SIDE: usize>(mask: u64, extent: [i64; 3]) -> u64 {
 #[inline(always)]
 const fn row_mask(bits: usize) -> u64 {
     if bits >= 64 { u64::MAX } else { (1 << bits) - 1 }
-}
-
-/// The voxels of a box in the bits of a cube.
-#[inline(always)]
-fn within<const SIDE: usize>(extent: [i64; 3]) -> u64 {
-    /// Bit 0 of each of `count` groups of `width` bits.
-    const fn every(width: usize, count: usize) -> u64 {
-        let mut mask = 0;
-        let mut i = 0;
-        while i < count {
-            mask |= 1 << (width * i);
-            i += 1;
-        }
-        mask
-    }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to SIDE - 1")]
-    let [x, y, z] = [extent[0] as usize + 1, extent[1] as usize + 1, extent[2] as usize + 1];
-    let keep_z = row_mask(z) * every(SIDE, SIDE * SIDE);
-    let keep_y = row_mask(SIDE * y) * every(SIDE * SIDE, SIDE);
-    let keep_x = row_mask(SIDE * SIDE * x);
-    keep_x & keep_y & keep_z
 }
 
 /// The lanes in which all three edge functions hold at voxel (a, b), for all of a tile.
