@@ -5,6 +5,8 @@
 //! cargo run --release -p trixel-gpu --example own_device
 //! ```
 
+#![expect(clippy::print_stdout, reason = "an example")]
+
 use trixel::lattice::LatticeMesh;
 use trixel::{Grid, Job, Mode};
 use trixel_gpu::{Gpu, GpuMesh, GpuVolume, Options, Voxelizer, wgpu};

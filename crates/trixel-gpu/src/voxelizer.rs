@@ -188,9 +188,7 @@ impl Voxelizer {
         let initial = self.cpu_part(mesh)?;
         let gpu = self.gpu.clone();
         // One guard around everything: most of what is recorded is only checked by the driver much later.
-        let recorded =
-            gpu.guarded(|| self.recorder(mesh, volume)?.record(encoder, strategy, classification, initial.as_ref()))?;
-        recorded
+        gpu.guarded(|| self.recorder(mesh, volume)?.record(encoder, strategy, classification, initial.as_ref()))?
     }
 
     fn recorder<'a>(&'a mut self, mesh: &'a GpuMesh, volume: &'a GpuVolume) -> Result<passes::Recorder<'a>, GpuError> {

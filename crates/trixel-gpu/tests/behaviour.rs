@@ -1,5 +1,7 @@
 //! Sizes at which GPU code goes wrong, and what the library promises beside the voxels.
 
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a failure here is a failed test")]
+
 use trixel::conformance::zoo;
 use trixel::lattice::LatticeMesh;
 use trixel::{Backend, CpuBackend, Grid, Job, Mesh, Mode, Strategy, Volume};

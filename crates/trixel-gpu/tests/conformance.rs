@@ -2,6 +2,8 @@
 //!
 //! Both drivers must be installed: a missing one fails the tests (`scripts/test` installs them).
 
+#![expect(clippy::panic, reason = "a failure here is a failed test")]
+
 use std::sync::LazyLock;
 
 use trixel::lattice::LatticeMesh;

@@ -2,6 +2,8 @@
 //!
 //! By default a few at 64, on both drivers. `TRIXEL_GPU_PROOF=1` runs all sizes and strategies, for an hour.
 
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a failure here is a failed test")]
+
 use std::path::PathBuf;
 
 use trixel::lattice::LatticeMesh;
