@@ -27,8 +27,8 @@ struct Params {
     triangles: u32,
     first_column: u32,
     max_columns: u32,
-    heuristic: u32,
     cutoff: f32,
+    unused: u32,
     window: [u32; 2],
     window_size: [f32; 2],
 }
@@ -275,7 +275,7 @@ impl<'a> Recorder<'a> {
         let written = self.list_group(list, true);
         let read = self.list_group(list, false);
         let arguments = self.arguments_group(&list.count, &list.arguments);
-        let first = self.compute_pipeline(Stage::TriangleParallel { hybrid: false });
+        let first = self.compute_pipeline(Stage::TriangleParallel { defers: None });
         let rest = self.compute_pipeline(Stage::TriangleList { small: false });
         let count = self.compute_pipeline(Stage::Arguments { vertices: 3 });
         let groups = self.groups(unit.chunk.triangles);
@@ -295,7 +295,7 @@ impl<'a> Recorder<'a> {
         encoder.clear_buffer(&list.count, 0, None);
         let written = self.list_group(list, true);
         let arguments = self.arguments_group(&list.count, &list.arguments);
-        let first = self.compute_pipeline(Stage::TriangleParallel { hybrid: true });
+        let first = self.compute_pipeline(Stage::TriangleParallel { defers: Some(self.setting.cutoff.heuristic) });
         let count = self.compute_pipeline(Stage::Arguments { vertices: self.setting.dilation.vertices() });
         let groups = self.groups(unit.chunk.triangles);
         let mut pass = self.begin(encoder, "triangle-parallel");
@@ -340,7 +340,7 @@ impl<'a> Recorder<'a> {
             &[&lists.small.triangles, &lists.small.count, &lists.large.triangles, &lists.large.count]
                 .map(wgpu::Buffer::as_entire_binding),
         );
-        let classify = self.compute_pipeline(Stage::Classify);
+        let classify = self.compute_pipeline(Stage::Classify { heuristic: self.setting.cutoff.heuristic });
         let vertices = self.setting.dilation.vertices();
         let count = self.compute_pipeline(Stage::Arguments { vertices });
         let small = self.arguments_group(&lists.small.count, &lists.small.arguments);
@@ -545,8 +545,8 @@ fn lay_out<'a>(setting: &Setting<'a>, target_size: u32) -> Result<Vec<Part<'a>>,
             triangles: 0,
             first_column: 0,
             max_columns,
-            heuristic: cutoff.heuristic.code(),
             cutoff: cutoff.value,
+            unused: 0,
             window: [0; 2],
             #[expect(clippy::cast_precision_loss, reason = "at most 8192")]
             window_size: [target_size as f32; 2],

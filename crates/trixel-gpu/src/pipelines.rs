@@ -69,7 +69,7 @@ impl Layouts {
         let second = match stage {
             Stage::TriangleParallel { .. } => Some(&self.list_write),
             Stage::TriangleList { .. } | Stage::Balanced => Some(&self.list_read),
-            Stage::Classify => Some(&self.classify),
+            Stage::Classify { .. } => Some(&self.classify),
             Stage::FragmentParallel { .. } => Some(&self.list_draw),
             Stage::CountColumns => Some(&self.columns),
             Stage::Fill | Stage::ScanBlocks | Stage::AddTotals | Stage::Arguments { .. } => None,

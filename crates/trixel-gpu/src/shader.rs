@@ -2,7 +2,7 @@
 
 use trixel::Mode;
 
-use crate::cutoff::Dilation;
+use crate::cutoff::{Dilation, Heuristic};
 use crate::limits::MAX_EXTENT;
 
 macro_rules! shader {
@@ -12,12 +12,12 @@ macro_rules! shader {
 /// A step of a voxelization that has its own pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Stage {
-    /// All triangles, one invocation each; the hybrid defers the large ones.
-    TriangleParallel { hybrid: bool },
+    /// All triangles, one invocation each; the hybrid defers those that are large by a heuristic.
+    TriangleParallel { defers: Option<Heuristic> },
     /// Triangles of a list, one invocation each; all small, or a share of the columns of each.
     TriangleList { small: bool },
     /// Small and large triangles to two lists.
-    Classify,
+    Classify { heuristic: Heuristic },
     /// The rasterizer, over all triangles or a list of them.
     FragmentParallel { listed: bool, dilation: Dilation },
     /// The number of columns of each triangle.
@@ -40,7 +40,7 @@ impl Stage {
         match self {
             Self::TriangleParallel { .. } => "triangle_parallel",
             Self::TriangleList { .. } => "triangle_list",
-            Self::Classify => "classify",
+            Self::Classify { .. } => "classify",
             Self::FragmentParallel { .. } => "fragment_parallel",
             Self::CountColumns => "count_columns",
             Self::Balanced => "balanced",
@@ -59,7 +59,7 @@ impl Stage {
             Self::TriangleList { .. } => {
                 shader!("wide" "common" "triangle" "column" "columns" "voxels" "counters" "triangle_list")
             }
-            Self::Classify => shader!("wide" "common" "triangle" "size" "counters" "classify"),
+            Self::Classify { .. } => shader!("wide" "common" "triangle" "size" "counters" "classify"),
             Self::FragmentParallel { .. } => {
                 shader!("wide" "common" "triangle" "column" "voxels" "counters" "fragment_parallel")
             }
@@ -94,7 +94,11 @@ pub(crate) fn source(stage: Stage, variant: Variant, max_groups: u32) -> String 
     let small = matches!(stage, Stage::TriangleParallel { .. } | Stage::TriangleList { small: true });
     source += &format!("const SMALL: bool = {small};\n");
     match stage {
-        Stage::TriangleParallel { hybrid } => source += &format!("const HYBRID: bool = {hybrid};\n"),
+        Stage::TriangleParallel { defers } => {
+            let (hybrid, heuristic) = (defers.is_some(), defers.unwrap_or_default().code());
+            source += &format!("const HYBRID: bool = {hybrid};\nconst HEURISTIC: u32 = {heuristic}u;\n");
+        }
+        Stage::Classify { heuristic } => source += &format!("const HEURISTIC: u32 = {}u;\n", heuristic.code()),
         Stage::FragmentParallel { listed, dilation } => {
             source += &format!("const LISTED: bool = {listed};\nconst DILATION: u32 = {}u;\n", dilation.code());
         }
@@ -118,11 +122,9 @@ mod tests {
     #[test]
     fn every_shader_is_valid() {
         let mut stages = vec![
-            Stage::TriangleParallel { hybrid: false },
-            Stage::TriangleParallel { hybrid: true },
+            Stage::TriangleParallel { defers: None },
             Stage::TriangleList { small: false },
             Stage::TriangleList { small: true },
-            Stage::Classify,
             Stage::CountColumns,
             Stage::Balanced,
             Stage::Fill,
@@ -130,6 +132,10 @@ mod tests {
             Stage::AddTotals,
             Stage::Arguments { vertices: 3 },
         ];
+        for heuristic in Heuristic::ALL {
+            stages.push(Stage::TriangleParallel { defers: Some(heuristic) });
+            stages.push(Stage::Classify { heuristic });
+        }
         for listed in [false, true] {
             stages.extend(Dilation::ALL.map(|dilation| Stage::FragmentParallel { listed, dilation }));
         }

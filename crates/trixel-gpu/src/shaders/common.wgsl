@@ -23,8 +23,8 @@ struct Params {
     // The part of each triangle's columns that one dispatch takes.
     first_column: u32,
     max_columns: u32,
-    heuristic: u32,
     cutoff: f32,
+    unused: u32,
     // The part of the projected grid that the raster target shows, in voxels.
     window: vec2<i32>,
     window_size: vec2<f32>,

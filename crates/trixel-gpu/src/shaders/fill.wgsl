@@ -13,10 +13,10 @@ fn fill(
         return;
     }
     let start = column * params.column_words;
-    let used = (u32(params.dims.z) + 31u) / 32u;
+    let end = start + (u32(params.dims.z) + 31u) / 32u;
     var carry = 0u;
-    for (var i = 0u; i < used; i++) {
-        var word = voxels[start + i];
+    for (var i = start; i < end; i++) {
+        var word = voxels[i];
         if (word | carry) == 0u {
             continue;
         }
@@ -27,10 +27,10 @@ fn fill(
         word ^= word << 16u;
         word ^= carry;
         carry = select(0u, 0xffffffffu, (word >> 31u) == 1u);
-        if i + 1u == used {
+        if i + 1u == end {
             // No bits above the grid.
             word &= 0xffffffffu >> (31u - ((u32(params.dims.z) - 1u) & 31u));
         }
-        voxels[start + i] = word;
+        voxels[i] = word;
     }
 }

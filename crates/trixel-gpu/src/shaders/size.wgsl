@@ -1,5 +1,6 @@
 // How large a triangle is, to tell small from large: DESIGN section 2. In voxels of the dominant projection; floats will
 // do, because either side of the cutoff gives the same voxels.
+// HEURISTIC is prepended: lavapipe compiles a shader anew for every run if it branches on a uniform alone.
 
 const PROJECTED_AREA: u32 = 0u;
 const BOX_AREA: u32 = 1u;
@@ -11,7 +12,7 @@ fn size_of(s: Shape) -> f32 {
     let box = vec2<f32>(max(max(s.v0, s.v1), s.v2).xy - min(min(s.v0, s.v1), s.v2).xy) / f32(STEPS);
     // The Minkowski sum of a convex polygon and the unit square.
     let dilated = area + box.x + box.y + 1.0;
-    switch params.heuristic {
+    switch HEURISTIC {
         case PROJECTED_AREA: { return area; }
         case BOX_AREA: { return box.x * box.y; }
         case DILATED_AREA: { return dilated; }
