@@ -117,7 +117,7 @@ impl Cutoff {
     /// triangle's set-up in the rasterizer some hundred columns. Real GPUs: the 2 to 4 square voxels of \[HCV\] 3.3.
     #[must_use]
     pub fn default_for(adapter: &AdapterInfo, heuristic: Heuristic) -> Self {
-        let area = if adapter.software { 256.0 } else { 4.0 };
+        let area = if adapter.software { 64.0 } else { 4.0 };
         Self { heuristic, value: heuristic.cutoff_for(area) }
     }
 }
