@@ -456,7 +456,7 @@ fn files_of(folder: &Path) -> std::collections::BTreeMap<std::path::PathBuf, Vec
 fn a_killed_run_is_resumed_and_gives_the_identical_result() {
     let bench = Bench::new();
     // A file to be read in passes, from the faces of voxels.
-    bench.ok("voxelize scene:torus:64 -r 200 --mode solid -o mesh.stl");
+    bench.ok("voxelize scene:torus:64 -r 400 --mode solid -o mesh.stl");
     let arguments =
         |name: &str| format!("voxelize mesh.stl -r 1500 -m solid -o {name} --memory-limit 120MiB --threads 2");
     let whole = bench.ok(&arguments("whole.zarr"));

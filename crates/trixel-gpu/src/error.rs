@@ -81,6 +81,18 @@ pub enum GpuError {
         /// Bytes of the largest binding.
         limit: u64,
     },
+    /// A grid too long for a 3D texture.
+    #[error(
+        "the grid is {side} voxels long, and 3D textures of {adapter} at most {limit}; read the voxels from the buffers"
+    )]
+    TextureTooLarge {
+        /// The adapter.
+        adapter: String,
+        /// The grid's longest side.
+        side: u32,
+        /// The device's longest.
+        limit: u32,
+    },
     /// The volume has another grid than the job.
     #[error("the volume's grid is not the job's")]
     GridMismatch,

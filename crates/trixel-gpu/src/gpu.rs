@@ -127,6 +127,10 @@ impl Gpu {
         GpuError::Refused { adapter: self.info().to_string(), reason: error.to_string() }
     }
 
+    pub(crate) fn plane_too_large(&self, needed: u64) -> GpuError {
+        GpuError::PlaneTooLarge { adapter: self.info().to_string(), needed, limit: self.limits().binding_bytes }
+    }
+
     fn check_lost(&self) -> Result<(), GpuError> {
         let lost = self.shared.lost.lock().unwrap_or_else(PoisonError::into_inner);
         match &*lost {

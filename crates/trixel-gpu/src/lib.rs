@@ -19,6 +19,7 @@ mod passes;
 mod pipelines;
 mod probe;
 mod shader;
+mod texture;
 mod timer;
 mod tune;
 mod volume;

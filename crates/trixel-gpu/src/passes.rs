@@ -9,7 +9,7 @@ use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::limits::{self, SCAN_BLOCK, WORKGROUP};
 use crate::mesh::{Chunk, GpuMesh};
-use crate::pipelines::{Pipeline, TARGET_FORMAT};
+use crate::pipelines::{Pipeline, TARGET_FORMAT, bind};
 use crate::shader::{Stage, Variant};
 use crate::timer::Timer;
 use crate::volume::{GpuVolume, Slab};
@@ -607,14 +607,6 @@ fn target(gpu: &Gpu, size: u32) -> Result<wgpu::TextureView, GpuError> {
         })
     })?;
     Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
-}
-
-fn bind(gpu: &Gpu, layout: &wgpu::BindGroupLayout, resources: &[wgpu::BindingResource<'_>]) -> wgpu::BindGroup {
-    let entries: Vec<_> = (0u32..)
-        .zip(resources)
-        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
-        .collect();
-    gpu.device().create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
 }
 
 type ComputePipeline = Option<std::sync::Arc<wgpu::ComputePipeline>>;

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use crate::gpu::Gpu;
 use crate::shader::{self, Stage, Variant};
 
 /// Which shader stages see a binding, and how.
@@ -40,6 +41,7 @@ pub(crate) struct Layouts {
     pub(crate) list_draw: wgpu::BindGroupLayout,
     pub(crate) classify: wgpu::BindGroupLayout,
     pub(crate) columns: wgpu::BindGroupLayout,
+    pub(crate) expand: wgpu::BindGroupLayout,
     pub(crate) scan: wgpu::BindGroupLayout,
     pub(crate) arguments: wgpu::BindGroupLayout,
 }
@@ -60,6 +62,7 @@ impl Layouts {
             list_draw: layout(device, &[Slot::Read(VERTEX)]),
             classify: layout(device, &[write, write, write, write]),
             columns: layout(device, &[write]),
+            expand: layout(device, &[Slot::Parameters, read, write]),
             scan: layout(device, &[Slot::Parameters, write, write]),
             arguments: layout(device, &[read, write]),
         }
@@ -72,9 +75,10 @@ impl Layouts {
             Stage::Classify { .. } => Some(&self.classify),
             Stage::FragmentParallel { .. } => Some(&self.list_draw),
             Stage::CountColumns => Some(&self.columns),
-            Stage::Fill | Stage::ScanBlocks | Stage::AddTotals | Stage::Arguments { .. } => None,
+            Stage::Fill | Stage::Expand | Stage::ScanBlocks | Stage::AddTotals | Stage::Arguments { .. } => None,
         };
         let first = match stage {
+            Stage::Expand => &self.expand,
             Stage::ScanBlocks | Stage::AddTotals => &self.scan,
             Stage::Arguments { .. } => &self.arguments,
             _ => &self.common,
@@ -108,6 +112,19 @@ fn layout(device: &wgpu::Device, slots: &[Slot]) -> wgpu::BindGroupLayout {
         })
         .collect();
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
+}
+
+/// The resources in the order of their bindings.
+pub(crate) fn bind(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    resources: &[wgpu::BindingResource<'_>],
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = (0u32..)
+        .zip(resources)
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
+        .collect();
+    gpu.device().create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
 }
 
 impl Pipelines {

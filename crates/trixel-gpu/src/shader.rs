@@ -26,6 +26,8 @@ pub(crate) enum Stage {
     Balanced,
     /// Parity upwards.
     Fill,
+    /// Bits to bytes.
+    Expand,
     /// Prefix sums within blocks.
     ScanBlocks,
     /// The second half of a prefix sum.
@@ -45,6 +47,7 @@ impl Stage {
             Self::CountColumns => "count_columns",
             Self::Balanced => "balanced",
             Self::Fill => "fill",
+            Self::Expand => "expand",
             Self::ScanBlocks => "scan_blocks",
             Self::AddTotals => "add_totals",
             Self::Arguments { .. } => "write_arguments",
@@ -66,6 +69,7 @@ impl Stage {
             Self::CountColumns => shader!("wide" "common" "triangle" "counters" "count_columns"),
             Self::Balanced => shader!("wide" "common" "triangle" "column" "voxels" "counters" "balanced"),
             Self::Fill => shader!("common" "fill"),
+            Self::Expand => shader!("expand"),
             Self::ScanBlocks | Self::AddTotals => shader!("scan"),
             Self::Arguments { .. } => shader!("arguments"),
         }
@@ -128,6 +132,7 @@ mod tests {
             Stage::CountColumns,
             Stage::Balanced,
             Stage::Fill,
+            Stage::Expand,
             Stage::ScanBlocks,
             Stage::AddTotals,
             Stage::Arguments { vertices: 3 },

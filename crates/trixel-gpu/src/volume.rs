@@ -54,11 +54,7 @@ impl GpuVolume {
         let plane_bytes = u64::from(ny) * u64::from(column_words) * 4;
         let planes = gpu.limits().slab_planes(plane_bytes);
         let Some(step) = u32::try_from(planes.min(u64::from(nx))).ok().filter(|step| *step > 0) else {
-            return Err(GpuError::PlaneTooLarge {
-                adapter: gpu.info().to_string(),
-                needed: plane_bytes,
-                limit: gpu.limits().binding_bytes,
-            });
+            return Err(gpu.plane_too_large(plane_bytes));
         };
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let slabs = (0..nx)

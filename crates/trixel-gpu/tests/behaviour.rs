@@ -146,9 +146,12 @@ fn meshes_and_grids_larger_than_a_binding_are_cut() {
 
 #[test]
 fn grids_wider_than_the_raster_target_are_drawn_in_windows() {
-    let gpu = small_device(1 << 26, 16);
-    let mesh = zoo::octahedron([20.0, 25.0, 30.0], 24.0);
-    compare(&gpu, "windows", &mesh, unit_grid([41, 53, 67]), &Mode::ALL);
+    // Of one slab, and of slabs that begin beyond the first window.
+    for binding_bytes in [1 << 26, 6_000] {
+        let gpu = small_device(binding_bytes, 16);
+        let mesh = zoo::octahedron([20.0, 25.0, 30.0], 24.0);
+        compare(&gpu, "windows", &mesh, unit_grid([41, 53, 67]), &Mode::ALL);
+    }
 }
 
 #[test]
@@ -279,4 +282,55 @@ fn an_empty_mesh_sets_nothing() {
 fn unknown_adapters_are_named_with_those_there_are() {
     let error = Gpu::open(&AdapterChoice::Named("no such thing".to_owned())).unwrap_err().to_string();
     assert!(error.contains("no such thing") && error.contains("llvmpipe"), "{error}");
+}
+
+#[test]
+fn a_texture_holds_the_voxels() {
+    // The small device cuts the grid into slabs and the texture into batches of planes.
+    let mesh = zoo::octahedron([20.0, 15.0, 33.0], 14.5);
+    let grid = unit_grid([41, 30, 67]);
+    let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
+    let job = Job::new(grid, Mode::Conservative);
+    let expected = on_cpu(&lattice, &job);
+    for gpu in [open("llvmpipe"), open("SwiftShader"), small_device(20_000, 256)] {
+        let on_gpu = GpuMesh::upload(&gpu, &lattice).unwrap();
+        let voxels = GpuVolume::new(&gpu, grid).unwrap();
+        let mut voxelizer = Voxelizer::new(&gpu, &job, &Options::default()).unwrap();
+        let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        voxelizer.record(&mut encoder, &on_gpu, &voxels).unwrap();
+        let texture = voxels.record_texture(&gpu, &mut encoder).unwrap();
+        let row = 256;
+        let answer = gpu.device().create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: row * 30 * 67,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &answer,
+                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(256), rows_per_image: Some(30) },
+            },
+            texture.size(),
+        );
+        gpu.queue().submit([encoder.finish()]);
+        voxelizer.check().unwrap();
+        answer.map_async(wgpu::MapMode::Read, .., |_| {});
+        gpu.wait().unwrap();
+        let texels = answer.get_mapped_range(..).unwrap();
+        for z in 0..67u32 {
+            for y in 0..30u32 {
+                for x in 0..41u32 {
+                    let texel = texels[((z * 30 + y) * 256 + x) as usize];
+                    assert_eq!(
+                        texel,
+                        if expected.get([x, y, z]) { 255 } else { 0 },
+                        "[{x}, {y}, {z}] on {}",
+                        gpu.info()
+                    );
+                }
+            }
+        }
+    }
 }

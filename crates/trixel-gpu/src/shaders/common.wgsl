@@ -25,7 +25,7 @@ struct Params {
     max_columns: u32,
     cutoff: f32,
     unused: u32,
-    // The part of the projected grid that the raster target shows, in voxels.
+    // The part of the projected slab that the raster target shows, in voxels from the slab's corner.
     window: vec2<i32>,
     window_size: vec2<f32>,
 }

@@ -162,6 +162,11 @@ fn dilated(t: Triangle, corner: u32) -> vec2<f32> {
     return rect.xy - MARGIN + reach * (size + 2.0 * MARGIN);
 }
 
+// The column in the corner of the raster target.
+fn window_corner(axis: u32) -> vec2<i32> {
+    return swizzle(slab_low(), axis).xy + params.window;
+}
+
 @vertex
 fn dilate(@builtin(vertex_index) index: u32) -> Varyings {
     let corner = index % VERTICES;
@@ -179,7 +184,7 @@ fn dilate(@builtin(vertex_index) index: u32) -> Varyings {
     }
     let t = triangle_of(shape);
     var v = pack(t);
-    let pixel = dilated(t, corner) + vec2<f32>(t.base.xy - params.window);
+    let pixel = dilated(t, corner) + vec2<f32>(t.base.xy - window_corner(t.flags & AXIS_MASK));
     let unit = pixel / params.window_size;
     v.position = vec4<f32>(2.0 * unit.x - 1.0, 1.0 - 2.0 * unit.y, 0.5, 1.0);
     return v;
@@ -188,7 +193,7 @@ fn dilate(@builtin(vertex_index) index: u32) -> Varyings {
 @fragment
 fn fragment_parallel(v: Varyings) -> @location(0) vec4<f32> {
     let t = unpack(v);
-    let column = vec2<i32>(floor(v.position.xy)) + params.window - t.base.xy;
+    let column = vec2<i32>(floor(v.position.xy)) + window_corner(t.flags & AXIS_MASK) - t.base.xy;
     let rect = column_rect(t.base, t.extent, t.flags & AXIS_MASK);
     var passed = false;
     if all(column >= rect.xy) && all(column <= rect.zw) {
