@@ -101,7 +101,13 @@ fn positive(text: &str) -> f64 {
     }
 }
 
-/// Ends the program with clap's kind of message and exit status 2.
+/// Ends the program with clap's kind of message, for the subcommand that runs, and exit status 2.
 pub(crate) fn usage(message: &str) -> ! {
-    Cli::command().error(ErrorKind::ValueValidation, message).exit()
+    let mut command = Cli::command();
+    command.build();
+    let running = std::env::args().nth(1).unwrap_or_default();
+    match command.find_subcommand_mut(&running) {
+        Some(subcommand) => subcommand.error(ErrorKind::ValueValidation, message).exit(),
+        None => command.error(ErrorKind::ValueValidation, message).exit(),
+    }
 }
