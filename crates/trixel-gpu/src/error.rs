@@ -96,6 +96,9 @@ pub enum GpuError {
     /// The volume has another grid than the job.
     #[error("the volume's grid is not the job's")]
     GridMismatch,
+    /// A classification of something else.
+    #[error("the classification is of another mesh, grid, mode or dilation; make a new one with `Voxelizer::classify`")]
+    OtherClassification,
     /// Triangles of a caller's own buffers are too large for the shaders.
     #[error(
         "{0} triangles are 8192 voxels or longer along an axis, too long for the shaders' arithmetic; upload the mesh with \

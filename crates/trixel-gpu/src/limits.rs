@@ -7,6 +7,9 @@ use trixel::lattice::STEP_BITS;
 /// voxelizes them.
 pub const MAX_EXTENT: i64 = 1 << 29;
 
+/// Pairs of triangle and column that `balanced` can number: whole rows of workgroups below 2^32.
+pub(crate) const MAX_PAIRS: u32 = 65_535 * 64 * 1024;
+
 /// Invocations of a workgroup.
 pub(crate) const WORKGROUP: u32 = 64;
 

@@ -192,6 +192,13 @@ impl<'a> Recorder<'a> {
         classification: Option<&Classification>,
         initial: Option<&Volume>,
     ) -> Result<(), GpuError> {
+        let units: usize = self.parts.iter().map(|part| part.units.len()).sum();
+        if classification.is_some_and(|given| {
+            let Classification { units: lists, mode, dilation } = given;
+            (lists.len(), *mode, *dilation) != (units, self.setting.job.mode(), self.setting.dilation)
+        }) {
+            return Err(GpuError::OtherClassification);
+        }
         encoder.clear_buffer(&self.setting.scratch.counters, 0, None);
         encoder.clear_buffer(&self.setting.scratch.status, 0, None);
         self.prepare(strategy, classification.is_some())?;
@@ -236,6 +243,8 @@ impl<'a> Recorder<'a> {
 
     /// Records the sorting of all triangles into new lists.
     pub(crate) fn classify_all(&mut self, encoder: &mut wgpu::CommandEncoder) -> Result<Classification, GpuError> {
+        encoder.clear_buffer(&self.setting.scratch.counters, 0, None);
+        encoder.clear_buffer(&self.setting.scratch.status, 0, None);
         let parts = std::mem::take(&mut self.parts);
         let mut units = vec![];
         for unit in parts.iter().flat_map(|part| &part.units) {
@@ -243,7 +252,9 @@ impl<'a> Recorder<'a> {
             self.classify(encoder, unit, &lists);
             units.push(lists);
         }
-        Ok(Classification { units })
+        let scratch = &*self.setting.scratch;
+        encoder.copy_buffer_to_buffer(&scratch.counters, 0, &scratch.status, 0, counters::BYTES);
+        Ok(Classification { units, mode: self.setting.job.mode(), dilation: self.setting.dilation })
     }
 
     /// Makes sure of the buffers that a strategy needs.

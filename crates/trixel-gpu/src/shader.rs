@@ -3,7 +3,7 @@
 use trixel::Mode;
 
 use crate::cutoff::{Dilation, Heuristic};
-use crate::limits::MAX_EXTENT;
+use crate::limits::{MAX_EXTENT, MAX_PAIRS};
 
 macro_rules! shader {
     ($($file:literal)*) => { &[$(include_str!(concat!("shaders/", $file, ".wgsl"))),*] };
@@ -108,6 +108,7 @@ pub(crate) fn source(stage: Stage, variant: Variant, max_groups: u32) -> String 
         }
         Stage::Arguments { vertices } => {
             source += &format!("const VERTICES: u32 = {vertices}u;\nconst MAX_GROUPS: u32 = {max_groups}u;\n");
+            source += &format!("const MAX_PAIRS: u32 = {MAX_PAIRS}u;\n");
         }
         _ => {}
     }

@@ -1,12 +1,13 @@
 //! Voxelizing meshes that are on the GPU, into voxels that stay there.
 
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, CpuBackend, Grid, Job, Mode, Strategy, Volume};
+use trixel::{Backend, CpuBackend, Grid, Job, Mode, Strategy, Volume, WORD_BITS};
 
 use crate::counters::{self, Counters};
 use crate::cutoff::{Cutoff, Dilation};
 use crate::error::GpuError;
 use crate::gpu::Gpu;
+use crate::limits::MAX_PAIRS;
 use crate::mesh::GpuMesh;
 use crate::passes::{self, Scratch};
 use crate::probe;
@@ -72,6 +73,8 @@ pub struct Voxelizer {
 #[derive(Debug)]
 pub struct Classification {
     pub(crate) units: Vec<passes::Lists>,
+    pub(crate) mode: Mode,
+    pub(crate) dilation: Dilation,
 }
 
 impl Voxelizer {
@@ -160,13 +163,15 @@ impl Voxelizer {
         let mut recorder = self.recorder(mesh, volume)?;
         let classification = recorder.classify_all(&mut encoder)?;
         self.gpu.guarded(|| self.gpu.queue().submit([encoder.finish()]))?;
+        self.check()?;
         Ok(classification)
     }
 
     /// [`Voxelizer::record`] with the classification made before: the second half of [`Strategy::HybridTwoPass`].
     ///
     /// # Errors
-    /// As for [`Voxelizer::record`]. The classification must be of this mesh and volume.
+    /// As for [`Voxelizer::record`], and when the classification is of another mode, dilation or number of pieces. It must be
+    /// of this mesh and volume.
     pub fn record_classified(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
@@ -219,12 +224,17 @@ impl Voxelizer {
         CpuBackend::default().voxelize(&mesh, &self.job.with_strategy(Strategy::Auto), &mut volume)?;
         if self.job.mode() == Mode::Solid {
             let column_words = volume.column_words();
+            let nz = self.job.grid().dims()[2];
             for column in volume.words_mut().chunks_exact_mut(column_words) {
                 let mut below = 0;
-                for word in column {
+                for word in column.iter_mut() {
                     let inside = *word;
                     *word ^= inside << 1 | below;
                     below = inside >> 63;
+                }
+                // The last toggle may have left the grid.
+                if let (Some(last), used @ 1..) = (column.last_mut(), nz % WORD_BITS) {
+                    *last &= u64::MAX >> (WORD_BITS - used);
                 }
             }
         }
@@ -268,7 +278,8 @@ impl Voxelizer {
         let (counters, too_large, overflown) = self.gpu.read(staging, bytes, |bytes| {
             let (counters, too_large) = counters::parse(bytes);
             let totals = bytes.get(usize::try_from(counters::BYTES).unwrap_or(usize::MAX)..).unwrap_or(&[]);
-            (counters, too_large, totals.as_chunks::<4>().0.contains(&[0xff; 4]))
+            let totals = totals.as_chunks::<4>().0;
+            (counters, too_large, totals.iter().any(|total| u32::from_le_bytes(*total) > MAX_PAIRS))
         })?;
         if too_large > 0 {
             return Err(GpuError::TrianglesTooLarge(too_large));

@@ -112,11 +112,14 @@ fn triangles_beyond_the_shaders_arithmetic_go_to_the_cpu() {
         zoo::soup(&[[[-9000.0, -5000.5, 3.25], [9000.0, -4000.0, 7.75], [20.0, 9000.0, 2.5]]]),
         zoo::octahedron([20.0, 20.0, 10.0], 8.0),
     ]);
-    let grid = unit_grid([40, 41, 42]);
-    let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
     let gpu = open("llvmpipe");
-    assert_eq!(GpuMesh::upload(&gpu, &lattice).unwrap().cpu_triangles(), 1);
-    compare(&gpu, "huge and small", &mesh, grid, &Mode::ALL);
+    // At 32 voxels along z, a toggle above the grid would land in the unused half of a word.
+    for nz in [32, 42] {
+        let grid = unit_grid([40, 41, nz]);
+        let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
+        assert_eq!(GpuMesh::upload(&gpu, &lattice).unwrap().cpu_triangles(), 1);
+        compare(&gpu, "huge and small", &mesh, grid, &Mode::ALL);
+    }
 }
 
 /// A device whose bindings hold little, so that meshes and grids are cut.
@@ -252,21 +255,25 @@ fn a_callers_buffers_are_used_as_they_are_and_checked() {
     };
     const S: i32 = 65_536;
     let grid = unit_grid([8; 3]);
-    let run = |far: i32| {
+    let run = |strategy: Strategy, far: i32| {
         let positions = buffer(&[S / 2, S / 2, S / 2, far, S / 2, S / 2, S / 2, 5 * S, S / 2]);
         let mesh = GpuMesh::from_buffers(positions, buffer(&[0, 1, 2]), 1);
         let voxels = GpuVolume::new(&gpu, grid).unwrap();
-        Voxelizer::new(&gpu, &Job::new(grid, Mode::Conservative), &Options::default()).unwrap().run(&mesh, &voxels).map(
-            |()| {
+        Voxelizer::new(&gpu, &Job::new(grid, Mode::Conservative).with_strategy(strategy), &Options::default())
+            .unwrap()
+            .run(&mesh, &voxels)
+            .map(|()| {
                 let mut volume = Volume::new(grid).unwrap();
                 voxels.download(&gpu, &mut volume).unwrap();
                 volume.count()
-            },
-        )
+            })
     };
     let mesh = zoo::soup(&[[[0.5; 3], [5.0, 0.5, 0.5], [0.5, 5.0, 0.5]]]);
-    assert_eq!(run(5 * S).unwrap(), trixel::voxelize(&mesh, &Job::new(grid, Mode::Conservative)).unwrap().count());
-    assert!(matches!(run(9000 * S), Err(GpuError::TrianglesTooLarge(1))));
+    let expected = trixel::voxelize(&mesh, &Job::new(grid, Mode::Conservative)).unwrap().count();
+    for strategy in STRATEGIES {
+        assert_eq!(run(strategy, 5 * S).unwrap(), expected);
+        assert!(matches!(run(strategy, 9000 * S), Err(GpuError::TrianglesTooLarge(1))), "{strategy}");
+    }
 }
 
 #[test]

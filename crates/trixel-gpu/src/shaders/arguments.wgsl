@@ -1,10 +1,12 @@
 // Turns a number of triangles into the arguments of a draw and of a dispatch over them. VERTICES is prepended.
 
-@group(0) @binding(0) var<storage, read> number: u32;
+@group(0) @binding(0) var<storage, read> counted: u32;
 @group(0) @binding(1) var<storage, read_write> arguments: array<u32, 7>;
 
 @compute @workgroup_size(1)
 fn write_arguments() {
+    // Beyond this, invocations could not be numbered: nothing runs, and the caller sees why.
+    let number = select(counted, 0u, counted > MAX_PAIRS);
     arguments[0] = number * VERTICES;
     arguments[1] = 1u;
     arguments[2] = 0u;

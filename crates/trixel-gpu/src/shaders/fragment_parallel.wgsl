@@ -175,6 +175,14 @@ fn dilate(@builtin(vertex_index) index: u32) -> Varyings {
         triangle = list[triangle];
     }
     let shape = shape_of(corners(triangle));
+    if (shape.flags & TOO_LARGE) != 0u {
+        // One pixel, whose fragment tells.
+        var tell: Varyings;
+        tell.ea_flags.w = i32(shape.flags);
+        let at = vec2<f32>(select(0.0, 1.5, corner == 1u), select(0.0, 1.5, corner == 2u)) / params.window_size;
+        tell.position = vec4<f32>(2.0 * at.x - 1.0, 1.0 - 2.0 * at.y, 0.5, 1.0);
+        return tell;
+    }
     if (shape.flags & EMPTY) != 0u {
         // Three times the same point: no fragment.
         var nothing: Varyings;
@@ -193,6 +201,10 @@ fn dilate(@builtin(vertex_index) index: u32) -> Varyings {
 @fragment
 fn fragment_parallel(v: Varyings) -> @location(0) vec4<f32> {
     let t = unpack(v);
+    count_too_large(t.flags);
+    if (t.flags & EMPTY) != 0u {
+        return vec4<f32>(0.0);
+    }
     let column = vec2<i32>(floor(v.position.xy)) + window_corner(t.flags & AXIS_MASK) - t.base.xy;
     let rect = column_rect(t.base, t.extent, t.flags & AXIS_MASK);
     var passed = false;
