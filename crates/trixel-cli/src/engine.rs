@@ -166,11 +166,8 @@ fn run_on_gpu(
     repeat: u32,
     reporter: &Reporter,
 ) -> Result<Ran, GpuError> {
-    let (voxelizer, check_ms) = reporter.stage("checking the GPU and building its pipelines", || {
-        let mut voxelizer = Voxelizer::new(gpu, job, options)?;
-        voxelizer.prepare()?;
-        Ok::<_, GpuError>(voxelizer)
-    });
+    let (voxelizer, check_ms) =
+        reporter.stage("checking the GPU and building its pipelines", || Voxelizer::new(gpu, job, options));
     let mut voxelizer = voxelizer?;
     let (on_gpu, upload_ms) = reporter.stage("uploading", || GpuMesh::upload(gpu, mesh));
     let on_gpu = on_gpu?;

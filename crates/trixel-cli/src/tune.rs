@@ -6,13 +6,12 @@ use std::process::ExitCode;
 use anyhow::Result;
 use trixel::lattice::LatticeMesh;
 use trixel::{Job, Strategy};
-use trixel_gpu::{AdapterChoice, Gpu, GpuMesh, GpuVolume, Options, Voxelizer};
+use trixel_gpu::{AdapterChoice, Gpu, GpuMesh, Options};
 
 use crate::args::TuneArgs;
 use crate::grid::{GridRequest, usage};
 use crate::mesh;
 use crate::progress::Reporter;
-use crate::report::median;
 use crate::tuned;
 use crate::voxelize::ContextOf;
 
@@ -39,7 +38,7 @@ pub(crate) fn run(mut args: TuneArgs) -> Result<ExitCode> {
     });
     let tuning = tuning?;
     let pure = [Strategy::TriangleParallel, Strategy::FragmentParallel].map(|strategy| -> Result<_> {
-        Ok((strategy.name(), measure(&gpu, &on_gpu, &job.with_strategy(strategy), &options, runs)?))
+        Ok((strategy.name(), trixel_gpu::measure(&gpu, &on_gpu, &job.with_strategy(strategy), &options, runs)?))
     });
     reporter.finish();
 
@@ -64,18 +63,4 @@ pub(crate) fn run(mut args: TuneArgs) -> Result<ExitCode> {
         let _ = writeln!(out, "stored cutoff {} in {}", tuning.best.value, path.display());
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// The median time of one strategy.
-fn measure(gpu: &Gpu, mesh: &GpuMesh, job: &Job, options: &Options, runs: usize) -> Result<f64> {
-    let volume = GpuVolume::new(gpu, *job.grid())?;
-    let mut voxelizer = Voxelizer::new(gpu, job, options)?;
-    voxelizer.prepare()?;
-    let mut times = vec![];
-    for _ in 0..runs {
-        let start = std::time::Instant::now();
-        voxelizer.run(mesh, &volume)?;
-        times.push(start.elapsed().as_secs_f64() * 1e3);
-    }
-    Ok(median(&times))
 }

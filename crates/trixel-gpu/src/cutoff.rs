@@ -45,7 +45,7 @@ impl Heuristic {
     }
 
     /// The cutoff that means about the same as this many square voxels of projected area, for a well-shaped triangle.
-    fn cutoff_for(self, area: f32) -> f32 {
+    pub(crate) fn cutoff_for(self, area: f32) -> f32 {
         // A right triangle with equal legs: sides sqrt(2 area), box twice the area.
         let side = (2.0 * area).sqrt();
         match self {

@@ -96,6 +96,11 @@ pub enum GpuError {
     /// The volume has another grid than the job.
     #[error("the volume's grid is not the job's")]
     GridMismatch,
+    /// A result that is not there yet.
+    #[error(
+        "nothing ran since the last recording: submit the encoder's commands to the queue before `Voxelizer::check`"
+    )]
+    NotSubmitted,
     /// A classification of something else.
     #[error("the classification is of another mesh, grid, mode or dilation; make a new one with `Voxelizer::classify`")]
     OtherClassification,

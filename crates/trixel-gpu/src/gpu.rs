@@ -5,12 +5,11 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use trixel::{Mode, Strategy};
-
 use crate::adapter::{self, AdapterChoice, AdapterInfo};
 use crate::error::GpuError;
 use crate::limits::Limits;
 use crate::pipelines::Pipelines;
+use crate::probe::Checked;
 
 /// A device to voxelize on. Cheap to clone; all clones share the pipelines, which are built once.
 #[derive(Clone, Debug)]
@@ -26,9 +25,9 @@ struct Shared {
     limits: Limits,
     pipelines: Pipelines,
     /// Why the device was lost, once it was.
-    lost: Arc<Mutex<Option<String>>>,
-    /// The modes and strategies in which it computes right voxels.
-    checked: Mutex<HashSet<(Mode, Strategy)>>,
+    lost: Mutex<Option<String>>,
+    /// What computes right voxels on it.
+    checked: Mutex<HashSet<Checked>>,
 }
 
 impl Gpu {
@@ -48,11 +47,19 @@ impl Gpu {
         });
         let (device, queue) = pollster::block_on(request)
             .map_err(|error| GpuError::Device { adapter: info.to_string(), reason: error.to_string() })?;
-        Ok(Self::with_info(device, queue, info))
+        let gpu = Self::with_info(device, queue, info);
+        let lost = Arc::downgrade(&gpu.shared);
+        gpu.device().set_device_lost_callback(move |_, message| {
+            if let Some(shared) = lost.upgrade() {
+                *shared.lost.lock().unwrap_or_else(PoisonError::into_inner) = Some(message);
+            }
+        });
+        Ok(gpu)
     }
 
     /// Voxelizes on a device that the program made itself. The device needs nothing beyond WebGPU's defaults; higher
-    /// limits of buffers allow larger grids at once.
+    /// limits of buffers allow larger grids at once. Its device-lost callback stays the program's: a loss shows as
+    /// [`GpuError::Refused`].
     #[must_use]
     pub fn from_device(device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let info = AdapterInfo::new(&device.adapter_info());
@@ -61,13 +68,9 @@ impl Gpu {
 
     fn with_info(device: wgpu::Device, queue: wgpu::Queue, info: AdapterInfo) -> Self {
         let limits = Limits::new(&device.limits());
-        let lost = Arc::new(Mutex::new(None));
-        let reason = Arc::clone(&lost);
-        device.set_device_lost_callback(move |_, message| {
-            *reason.lock().unwrap_or_else(PoisonError::into_inner) = Some(message);
-        });
         let pipelines = Pipelines::new(&device);
-        Self { shared: Arc::new(Shared { device, queue, info, limits, pipelines, lost, checked: Mutex::default() }) }
+        let (lost, checked) = Default::default();
+        Self { shared: Arc::new(Shared { device, queue, info, limits, pipelines, lost, checked }) }
     }
 
     /// The device.
@@ -96,12 +99,12 @@ impl Gpu {
         &self.shared.pipelines
     }
 
-    pub(crate) fn is_checked(&self, mode: Mode, strategy: Strategy) -> bool {
-        self.shared.checked.lock().unwrap_or_else(PoisonError::into_inner).contains(&(mode, strategy))
+    pub(crate) fn is_checked(&self, what: &Checked) -> bool {
+        self.shared.checked.lock().unwrap_or_else(PoisonError::into_inner).contains(what)
     }
 
-    pub(crate) fn set_checked(&self, mode: Mode, strategy: Strategy) {
-        self.shared.checked.lock().unwrap_or_else(PoisonError::into_inner).insert((mode, strategy));
+    pub(crate) fn set_checked(&self, what: Checked) {
+        self.shared.checked.lock().unwrap_or_else(PoisonError::into_inner).insert(what);
     }
 
     pub(crate) fn has_timestamps(&self) -> bool {

@@ -1,5 +1,7 @@
 //! Meshes on the GPU, as lattice positions and indices.
 
+use std::collections::HashMap;
+
 use trixel::lattice::{LatticeMesh, LatticePositions};
 
 use crate::error::GpuError;
@@ -26,15 +28,29 @@ pub(crate) struct Chunk {
     pub(crate) triangles: u32,
 }
 
+/// Few triangles of many: the mesh's other vertices are not kept for them.
 #[derive(Debug)]
 pub(crate) struct Leftover {
-    positions: LatticePositions,
+    positions: Vec<[i64; 3]>,
     triangles: Vec<[u32; 3]>,
 }
 
 impl Leftover {
+    fn new(mesh: &LatticeMesh<'_>, triangles: &[[u32; 3]]) -> Self {
+        let mut places = HashMap::new();
+        let mut positions = vec![];
+        let mut place_of = |vertex: u32| {
+            *places.entry(vertex).or_insert_with(|| {
+                positions.push(mesh.positions.get(vertex));
+                u32::try_from(positions.len() - 1).unwrap_or(u32::MAX)
+            })
+        };
+        let triangles = triangles.iter().map(|triangle| triangle.map(&mut place_of)).collect();
+        Self { positions, triangles }
+    }
+
     pub(crate) fn mesh(&self) -> LatticeMesh<'_> {
-        LatticeMesh { positions: self.positions.clone(), triangles: &self.triangles }
+        LatticeMesh { positions: LatticePositions::Wide(self.positions.clone()), triangles: &self.triangles }
     }
 }
 
@@ -95,8 +111,7 @@ impl GpuMesh {
         if !triangles.is_empty() {
             chunks.push(Chunk::new(gpu, positions.as_flattened(), triangles.as_flattened())?);
         }
-        let leftover =
-            (!leftover.is_empty()).then(|| Leftover { positions: mesh.positions.clone(), triangles: leftover });
+        let leftover = (!leftover.is_empty()).then(|| Leftover::new(mesh, &leftover));
         Ok(Self { chunks, leftover, most_columns: Some(most_columns) })
     }
 
@@ -109,12 +124,6 @@ impl GpuMesh {
     pub fn from_buffers(positions: wgpu::Buffer, indices: wgpu::Buffer, triangles: u32) -> Self {
         let chunks = if triangles == 0 { vec![] } else { vec![Chunk { positions, indices, triangles }] };
         Self { chunks, leftover: None, most_columns: None }
-    }
-
-    /// One triangle that sets nothing, to run pipelines on.
-    pub(crate) fn empty(gpu: &Gpu) -> Result<Self, GpuError> {
-        let chunk = Chunk::new(gpu, &[-(1 << 20); 3], &[0; 3])?;
-        Ok(Self { chunks: vec![chunk], leftover: None, most_columns: None })
     }
 
     /// How many triangles are on the GPU.

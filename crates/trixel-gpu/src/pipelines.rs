@@ -1,10 +1,11 @@
 //! Pipelines, built when first needed and kept.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::hash::Hash;
+use std::sync::{Mutex, PoisonError};
 
 use crate::gpu::Gpu;
-use crate::shader::{self, Stage, Variant};
+use crate::shader::{self, Raster, Stage, Variant};
 
 /// Which shader stages see a binding, and how.
 #[derive(Clone, Copy)]
@@ -23,13 +24,19 @@ pub(crate) const TARGET_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Uno
 #[derive(Debug)]
 pub(crate) struct Pipelines {
     layouts: Layouts,
-    built: Mutex<HashMap<(Stage, Variant), Pipeline>>,
+    compute: Kept<Stage, wgpu::ComputePipeline>,
+    raster: Kept<Raster, wgpu::RenderPipeline>,
 }
 
-#[derive(Clone, Debug)]
-pub(crate) enum Pipeline {
-    Compute(Arc<wgpu::ComputePipeline>),
-    Raster(Arc<wgpu::RenderPipeline>),
+/// Pipelines by what they are for.
+type Kept<Key, Pipeline> = Mutex<HashMap<(Key, Variant), Pipeline>>;
+
+fn keep<Key: Eq + Hash, Pipeline: Clone>(
+    kept: &Kept<Key, Pipeline>,
+    key: (Key, Variant),
+    build: impl FnOnce() -> Pipeline,
+) -> Pipeline {
+    kept.lock().unwrap_or_else(PoisonError::into_inner).entry(key).or_insert_with(build).clone()
 }
 
 /// The layouts of bind groups. `common` is group 0 of all stages that know the parameters.
@@ -68,12 +75,11 @@ impl Layouts {
         }
     }
 
-    fn of(&self, stage: Stage) -> [Option<&wgpu::BindGroupLayout>; 2] {
+    fn of(&self, stage: Stage) -> Vec<Option<&wgpu::BindGroupLayout>> {
         let second = match stage {
             Stage::TriangleParallel { .. } => Some(&self.list_write),
             Stage::TriangleList { .. } | Stage::Balanced => Some(&self.list_read),
             Stage::Classify { .. } => Some(&self.classify),
-            Stage::FragmentParallel { .. } => Some(&self.list_draw),
             Stage::CountColumns => Some(&self.columns),
             Stage::Fill | Stage::Expand | Stage::ScanBlocks | Stage::AddTotals | Stage::Arguments { .. } => None,
         };
@@ -83,7 +89,7 @@ impl Layouts {
             Stage::Arguments { .. } => &self.arguments,
             _ => &self.common,
         };
-        [Some(first), second]
+        [first].into_iter().chain(second).map(Some).collect()
     }
 }
 
@@ -129,67 +135,78 @@ pub(crate) fn bind(
 
 impl Pipelines {
     pub(crate) fn new(device: &wgpu::Device) -> Self {
-        Self { layouts: Layouts::new(device), built: Mutex::default() }
+        Self { layouts: Layouts::new(device), compute: Kept::default(), raster: Kept::default() }
     }
 
     pub(crate) fn layouts(&self) -> &Layouts {
         &self.layouts
     }
 
-    /// The pipeline of a stage. Errors go to the device's error scopes.
-    pub(crate) fn get(&self, device: &wgpu::Device, stage: Stage, variant: Variant, max_groups: u32) -> Pipeline {
-        let mut built = self.built.lock().unwrap_or_else(PoisonError::into_inner);
-        built.entry((stage, variant)).or_insert_with(|| self.build(device, stage, variant, max_groups)).clone()
-    }
-
-    fn build(&self, device: &wgpu::Device, stage: Stage, variant: Variant, max_groups: u32) -> Pipeline {
-        let label = Some(stage.entry_point());
-        let source = shader::source(stage, variant, max_groups);
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label,
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        });
-        let groups = self.layouts.of(stage);
-        let groups: &[_] = if groups[1].is_some() { &groups } else { &groups[..1] };
-        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label,
-            bind_group_layouts: groups,
-            immediate_size: 0,
-        });
-        if !matches!(stage, Stage::FragmentParallel { .. }) {
-            return Pipeline::Compute(Arc::new(device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+    /// The pipeline of a compute stage. Errors go to the device's error scopes.
+    pub(crate) fn compute(&self, gpu: &Gpu, stage: Stage, variant: Variant) -> wgpu::ComputePipeline {
+        keep(&self.compute, (stage, variant), || {
+            let label = Some(stage.entry_point());
+            let source = shader::source(stage, variant, gpu.limits().groups);
+            let (module, layout) = module_and_layout(gpu.device(), label, source, &self.layouts.of(stage));
+            gpu.device().create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label,
                 layout: Some(&layout),
                 module: &module,
                 entry_point: label,
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
                 cache: None,
-            })));
-        }
-        Pipeline::Raster(Arc::new(device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label,
-            layout: Some(&layout),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("dilate"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: None,
-            multisample: wgpu::MultisampleState::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: label,
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                targets: &[Some(wgpu::ColorTargetState {
-                    format: TARGET_FORMAT,
-                    blend: None,
-                    write_mask: wgpu::ColorWrites::empty(),
-                })],
-            }),
-            multiview_mask: None,
-            cache: None,
-        })))
+            })
+        })
     }
+
+    /// The pipeline of the rasterizer. Errors go to the device's error scopes.
+    pub(crate) fn raster(&self, gpu: &Gpu, raster: Raster, variant: Variant) -> wgpu::RenderPipeline {
+        keep(&self.raster, (raster, variant), || {
+            let label = Some(Raster::FRAGMENT_ENTRY_POINT);
+            let source = shader::raster_source(raster, variant);
+            let layouts = [Some(&self.layouts.common), Some(&self.layouts.list_draw)];
+            let (module, layout) = module_and_layout(gpu.device(), label, source, &layouts);
+            gpu.device().create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label,
+                layout: Some(&layout),
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some(Raster::VERTEX_ENTRY_POINT),
+                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: None,
+                multisample: wgpu::MultisampleState::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: label,
+                    compilation_options: wgpu::PipelineCompilationOptions::default(),
+                    targets: &[Some(wgpu::ColorTargetState {
+                        format: TARGET_FORMAT,
+                        blend: None,
+                        write_mask: wgpu::ColorWrites::empty(),
+                    })],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        })
+    }
+}
+
+fn module_and_layout(
+    device: &wgpu::Device,
+    label: Option<&str>,
+    source: String,
+    groups: &[Option<&wgpu::BindGroupLayout>],
+) -> (wgpu::ShaderModule, wgpu::PipelineLayout) {
+    let source = wgpu::ShaderSource::Wgsl(source.into());
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source });
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label,
+        bind_group_layouts: groups,
+        immediate_size: 0,
+    });
+    (module, layout)
 }

@@ -1,12 +1,13 @@
 //! The check before the first use: does this driver compute right voxels?
 
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, CpuBackend, Grid, Job, Mesh, Mode, Strategy, Volume};
+use trixel::{Backend, CpuBackend, Grid, Job, Mesh, Strategy, Volume};
 
-use crate::cutoff::{Cutoff, Heuristic};
+use crate::cutoff::{Cutoff, Dilation, Heuristic};
 use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::mesh::GpuMesh;
+use crate::shader::Variant;
 use crate::volume::GpuVolume;
 use crate::voxelizer::{Options, Voxelizer};
 
@@ -41,23 +42,33 @@ fn scene() -> Mesh {
     Mesh::new(positions, triangles)
 }
 
-/// Voxelizes the scene in one mode by one strategy and compares with the CPU; once per device, mode and strategy, because
-/// building the pipelines of all of them takes some drivers many seconds.
-pub(crate) fn check(gpu: &Gpu, mode: Mode, strategy: Strategy) -> Result<(), GpuError> {
-    if gpu.is_checked(mode, strategy) {
+/// What is checked together, once per device: what pipelines are specialized for. Not everything at once, because building
+/// all pipelines takes some drivers many seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Checked {
+    pub(crate) variant: Variant,
+    pub(crate) strategy: Strategy,
+    pub(crate) heuristic: Heuristic,
+    pub(crate) dilation: Dilation,
+}
+
+/// Voxelizes the scene and compares with the CPU.
+pub(crate) fn check(gpu: &Gpu, what: Checked) -> Result<(), GpuError> {
+    if gpu.is_checked(&what) {
         return Ok(());
     }
+    let Checked { variant, strategy, heuristic, dilation } = what;
     let mesh = scene();
     let grid = Grid::new([0.0; 3], [1.0; 3], [301, 283, 9]).map_err(trixel::Error::from)?;
-    let job = Job::new(grid, mode);
+    let job = Job::new(grid, variant.mode);
     let lattice = LatticeMesh::snap(&mesh, &grid).map_err(trixel::Error::from)?;
     let mut expected = Volume::new(grid).map_err(trixel::Error::from)?;
     CpuBackend::default().voxelize(&lattice, &job, &mut expected)?;
     let on_gpu = GpuMesh::upload(gpu, &lattice)?;
     let voxels = GpuVolume::new(gpu, grid)?;
     // Some of the scene on either side.
-    let cutoff = Some(Cutoff { heuristic: Heuristic::ProjectedArea, value: 8.0 });
-    let options = Options { cutoff, ..Options::default() };
+    let cutoff = Cutoff { heuristic, value: heuristic.cutoff_for(8.0) };
+    let options = Options { cutoff: Some(cutoff), dilation, count: variant.counting };
     Voxelizer::unchecked(gpu, &job.with_strategy(strategy), &options)?.run(&on_gpu, &voxels)?;
     let mut found = Volume::new(grid).map_err(trixel::Error::from)?;
     voxels.download(gpu, &mut found)?;
@@ -66,9 +77,9 @@ pub(crate) fn check(gpu: &Gpu, mode: Mode, strategy: Strategy) -> Result<(), Gpu
     if wrong > 0 {
         return Err(GpuError::WrongVoxels {
             adapter: gpu.info().to_string(),
-            reason: format!("{wrong} of {} in mode {mode} by {strategy}", expected.count()),
+            reason: format!("{wrong} of {} in mode {} by {strategy}", expected.count(), variant.mode),
         });
     }
-    gpu.set_checked(mode, strategy);
+    gpu.set_checked(what);
     Ok(())
 }

@@ -9,7 +9,7 @@ macro_rules! shader {
     ($($file:literal)*) => { &[$(include_str!(concat!("shaders/", $file, ".wgsl"))),*] };
 }
 
-/// A step of a voxelization that has its own pipeline.
+/// A step of a voxelization that has its own compute pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Stage {
     /// All triangles, one invocation each; the hybrid defers those that are large by a heuristic.
@@ -18,8 +18,6 @@ pub(crate) enum Stage {
     TriangleList { small: bool },
     /// Small and large triangles to two lists.
     Classify { heuristic: Heuristic },
-    /// The rasterizer, over all triangles or a list of them.
-    FragmentParallel { listed: bool, dilation: Dilation },
     /// The number of columns of each triangle.
     CountColumns,
     /// One invocation a pair of triangle and column.
@@ -37,13 +35,12 @@ pub(crate) enum Stage {
 }
 
 impl Stage {
-    /// The function in the shader; that of the fragment stage for a raster pipeline.
+    /// The function in the shader.
     pub(crate) fn entry_point(self) -> &'static str {
         match self {
             Self::TriangleParallel { .. } => "triangle_parallel",
             Self::TriangleList { .. } => "triangle_list",
             Self::Classify { .. } => "classify",
-            Self::FragmentParallel { .. } => "fragment_parallel",
             Self::CountColumns => "count_columns",
             Self::Balanced => "balanced",
             Self::Fill => "fill",
@@ -57,16 +54,13 @@ impl Stage {
     fn files(self) -> &'static [&'static str] {
         match self {
             Self::TriangleParallel { .. } => shader!(
-                "wide" "common" "triangle" "size" "column" "columns" "voxels" "counters" "triangle_parallel"
+                "wide" "common" "triangle" "size" "look" "column" "columns" "voxels" "counters" "triangle_parallel"
             ),
             Self::TriangleList { .. } => {
                 shader!("wide" "common" "triangle" "column" "columns" "voxels" "counters" "triangle_list")
             }
-            Self::Classify { .. } => shader!("wide" "common" "triangle" "size" "counters" "classify"),
-            Self::FragmentParallel { .. } => {
-                shader!("wide" "common" "triangle" "column" "voxels" "counters" "fragment_parallel")
-            }
-            Self::CountColumns => shader!("wide" "common" "triangle" "counters" "count_columns"),
+            Self::Classify { .. } => shader!("wide" "common" "triangle" "size" "look" "counters" "classify"),
+            Self::CountColumns => shader!("wide" "common" "triangle" "look" "counters" "count_columns"),
             Self::Balanced => shader!("wide" "common" "triangle" "column" "voxels" "counters" "balanced"),
             Self::Fill => shader!("common" "fill"),
             Self::Expand => shader!("expand"),
@@ -76,15 +70,59 @@ impl Stage {
     }
 }
 
-/// What a stage is specialized for.
+/// The rasterizer, over all triangles or a list of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Raster {
+    pub(crate) listed: bool,
+    pub(crate) dilation: Dilation,
+}
+
+impl Raster {
+    pub(crate) const VERTEX_ENTRY_POINT: &str = "dilate";
+    pub(crate) const FRAGMENT_ENTRY_POINT: &str = "fragment_parallel";
+    const FILES: &[&str] = shader!("wide" "common" "triangle" "column" "voxels" "counters" "fragment_parallel");
+}
+
+/// What a pipeline is specialized for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Variant {
     pub(crate) mode: Mode,
     pub(crate) counting: bool,
 }
 
-/// The WGSL of a stage.
+impl Variant {
+    /// Of stages that are the same in every mode.
+    pub(crate) const ANY: Self = Self { mode: Mode::Conservative, counting: false };
+}
+
+/// The WGSL of a compute stage.
 pub(crate) fn source(stage: Stage, variant: Variant, max_groups: u32) -> String {
+    let small = matches!(stage, Stage::TriangleParallel { .. } | Stage::TriangleList { small: true });
+    let mut constants = format!("const SMALL: bool = {small};\n");
+    match stage {
+        Stage::TriangleParallel { defers } => {
+            let (hybrid, heuristic) = (defers.is_some(), defers.unwrap_or_default().code());
+            constants += &format!("const HYBRID: bool = {hybrid};\nconst HEURISTIC: u32 = {heuristic}u;\n");
+        }
+        Stage::Classify { heuristic } => constants += &format!("const HEURISTIC: u32 = {}u;\n", heuristic.code()),
+        Stage::Arguments { vertices } => {
+            constants += &format!("const VERTICES: u32 = {vertices}u;\nconst MAX_GROUPS: u32 = {max_groups}u;\n");
+            constants += &format!("const MAX_PAIRS: u32 = {MAX_PAIRS}u;\n");
+        }
+        _ => {}
+    }
+    assemble(variant, &constants, stage.files())
+}
+
+/// The WGSL of a vertex and a fragment stage.
+pub(crate) fn raster_source(raster: Raster, variant: Variant) -> String {
+    let (listed, dilation) = (raster.listed, raster.dilation.code());
+    let constants =
+        format!("const SMALL: bool = false;\nconst LISTED: bool = {listed};\nconst DILATION: u32 = {dilation}u;\n");
+    assemble(variant, &constants, Raster::FILES)
+}
+
+fn assemble(variant: Variant, constants: &str, files: &[&str]) -> String {
     let mode = match variant.mode {
         Mode::Conservative => 0,
         Mode::Thin => 1,
@@ -92,40 +130,41 @@ pub(crate) fn source(stage: Stage, variant: Variant, max_groups: u32) -> String 
         Mode::Sliced => 3,
     };
     let counting = variant.counting;
-    let mut source = format!(
+    let shared = format!(
         "const MODE: u32 = {mode}u;\nconst COUNTING: bool = {counting};\nconst MAX_EXTENT: u32 = {MAX_EXTENT}u;\n"
     );
-    let small = matches!(stage, Stage::TriangleParallel { .. } | Stage::TriangleList { small: true });
-    source += &format!("const SMALL: bool = {small};\n");
-    match stage {
-        Stage::TriangleParallel { defers } => {
-            let (hybrid, heuristic) = (defers.is_some(), defers.unwrap_or_default().code());
-            source += &format!("const HYBRID: bool = {hybrid};\nconst HEURISTIC: u32 = {heuristic}u;\n");
-        }
-        Stage::Classify { heuristic } => source += &format!("const HEURISTIC: u32 = {}u;\n", heuristic.code()),
-        Stage::FragmentParallel { listed, dilation } => {
-            source += &format!("const LISTED: bool = {listed};\nconst DILATION: u32 = {}u;\n", dilation.code());
-        }
-        Stage::Arguments { vertices } => {
-            source += &format!("const VERTICES: u32 = {vertices}u;\nconst MAX_GROUPS: u32 = {max_groups}u;\n");
-            source += &format!("const MAX_PAIRS: u32 = {MAX_PAIRS}u;\n");
-        }
-        _ => {}
-    }
-    for file in stage.files() {
-        source += file;
-        source += "\n";
-    }
-    source
+    [&[shared.as_str(), constants], files].concat().join("\n")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// naga accepts every stage in every variant, with nothing but what WebGPU has everywhere.
+    const VARIANTS: [Variant; 8] = {
+        let mut variants = [Variant::ANY; 8];
+        let mut i = 0;
+        while i < variants.len() {
+            variants[i] = Variant { mode: Mode::ALL[i / 2], counting: i % 2 == 1 };
+            i += 1;
+        }
+        variants
+    };
+
+    /// naga accepts it, with nothing but what WebGPU has everywhere.
+    fn assert_valid(source: &str, entry_points: &[&str]) {
+        let module = naga::front::wgsl::parse_str(source)
+            .unwrap_or_else(|error| panic!("{entry_points:?}: {}", error.emit_to_string(source)));
+        let (flags, capabilities) = (naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+        naga::valid::Validator::new(flags, capabilities)
+            .validate(&module)
+            .unwrap_or_else(|error| panic!("{entry_points:?}: {}", error.emit_to_string(source)));
+        for name in entry_points {
+            assert!(module.entry_points.iter().any(|entry| entry.name == *name), "{name}");
+        }
+    }
+
     #[test]
-    fn every_shader_is_valid() {
+    fn every_compute_stage_is_valid() {
         let mut stages = vec![
             Stage::TriangleParallel { defers: None },
             Stage::TriangleList { small: false },
@@ -142,23 +181,20 @@ mod tests {
             stages.push(Stage::TriangleParallel { defers: Some(heuristic) });
             stages.push(Stage::Classify { heuristic });
         }
-        for listed in [false, true] {
-            stages.extend(Dilation::ALL.map(|dilation| Stage::FragmentParallel { listed, dilation }));
-        }
         for stage in stages {
-            for mode in Mode::ALL {
-                for counting in [false, true] {
-                    let source = source(stage, Variant { mode, counting }, 65_535);
-                    let module = naga::front::wgsl::parse_str(&source)
-                        .unwrap_or_else(|error| panic!("{stage:?}: {}", error.emit_to_string(&source)));
-                    let mut validator = naga::valid::Validator::new(
-                        naga::valid::ValidationFlags::all(),
-                        naga::valid::Capabilities::empty(),
-                    );
-                    validator
-                        .validate(&module)
-                        .unwrap_or_else(|error| panic!("{stage:?} {mode}: {}", error.emit_to_string(&source)));
-                    assert!(module.entry_points.iter().any(|entry| entry.name == stage.entry_point()));
+            for variant in VARIANTS {
+                assert_valid(&source(stage, variant, 65_535), &[stage.entry_point()]);
+            }
+        }
+    }
+
+    #[test]
+    fn every_raster_stage_is_valid() {
+        for dilation in Dilation::ALL {
+            for listed in [false, true] {
+                for variant in VARIANTS {
+                    let source = raster_source(Raster { listed, dilation }, variant);
+                    assert_valid(&source, &[Raster::VERTEX_ENTRY_POINT, Raster::FRAGMENT_ENTRY_POINT]);
                 }
             }
         }

@@ -1,12 +1,11 @@
 //! Voxels as a 3D texture, for programs that sample them.
 
 use bytemuck::{Pod, Zeroable};
-use trixel::Mode;
 
 use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::limits::WORKGROUP;
-use crate::pipelines::{Pipeline, bind};
+use crate::pipelines::bind;
 use crate::shader::{Stage, Variant};
 use crate::volume::GpuVolume;
 
@@ -59,13 +58,7 @@ impl GpuVolume {
         texture: &wgpu::Texture,
     ) -> Result<(), GpuError> {
         let [_, ny, nz] = self.grid().dims();
-        // The stage is the same in every mode.
-        let variant = Variant { mode: Mode::Conservative, counting: false };
-        let Pipeline::Compute(pipeline) =
-            gpu.pipelines().get(gpu.device(), Stage::Expand, variant, gpu.limits().groups)
-        else {
-            return Ok(());
-        };
+        let pipeline = gpu.pipelines().compute(gpu, Stage::Expand, Variant::ANY);
         for slab in self.slabs() {
             let row_bytes = slab.nx().next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
             let plane_bytes = u64::from(row_bytes) * u64::from(ny);

@@ -69,6 +69,26 @@ fn golden_section<E>(
     Ok(best)
 }
 
+/// The median time of `runs` voxelizations, in milliseconds, without upload and download.
+///
+/// # Errors
+/// As for [`Voxelizer::run`].
+pub fn measure(gpu: &Gpu, mesh: &GpuMesh, job: &Job, options: &Options, runs: usize) -> Result<f64, GpuError> {
+    let volume = GpuVolume::new(gpu, *job.grid())?;
+    median_ms(&mut Voxelizer::new(gpu, job, options)?, mesh, &volume, runs)
+}
+
+fn median_ms(voxelizer: &mut Voxelizer, mesh: &GpuMesh, volume: &GpuVolume, runs: usize) -> Result<f64, GpuError> {
+    let mut times = vec![];
+    for _ in 0..runs.max(1) {
+        let start = Instant::now();
+        voxelizer.run(mesh, volume)?;
+        times.push(start.elapsed().as_secs_f64() * 1e3);
+    }
+    times.sort_by(f64::total_cmp);
+    Ok(times[times.len() / 2])
+}
+
 /// Searches the cutoff at which [`Strategy::Hybrid`] is fastest for this mesh and job, by the median of `runs` runs each.
 /// `progress` is told every sample.
 ///
@@ -84,20 +104,13 @@ pub fn tune(
     mut progress: impl FnMut(Sample),
 ) -> Result<Tuning, GpuError> {
     let volume = GpuVolume::new(gpu, *job.grid())?;
-    let mut voxelizer = Voxelizer::new(gpu, &job.with_strategy(Strategy::Hybrid), options)?;
-    // Pipelines are built in the first run.
-    voxelizer.run(mesh, &volume)?;
+    // The pipelines depend on the heuristic, not on the value.
+    let options = Options { cutoff: Some(Cutoff::default_for(gpu.info(), heuristic)), ..*options };
+    let mut voxelizer = Voxelizer::new(gpu, &job.with_strategy(Strategy::Hybrid), &options)?;
     let mut curve = vec![];
-    let mut measure = |cutoff: f32| {
-        voxelizer.set_cutoff(Cutoff { heuristic, value: cutoff });
-        let mut times = vec![];
-        for _ in 0..runs.max(1) {
-            let start = Instant::now();
-            voxelizer.run(mesh, &volume)?;
-            times.push(start.elapsed().as_secs_f64() * 1e3);
-        }
-        times.sort_by(f64::total_cmp);
-        let sample = Sample { cutoff, ms: times[times.len() / 2] };
+    let mut at_cutoff = |cutoff: f32| {
+        voxelizer.set_cutoff(cutoff);
+        let sample = Sample { cutoff, ms: median_ms(&mut voxelizer, mesh, &volume, runs)? };
         curve.push(sample);
         progress(sample);
         Ok::<f64, GpuError>(sample.ms)
@@ -109,7 +122,7 @@ pub fn tune(
     };
     // Both ends, which are the pure strategies but for the overhead: the minimum may lie there.
     #[expect(clippy::cast_possible_truncation, reason = "a cutoff")]
-    let mut at = |octave: f64| measure(octave.exp2() as f32);
+    let mut at = |octave: f64| at_cutoff(octave.exp2() as f32);
     let ends = [(low, at(low)?), (high, at(high)?)];
     let inner = golden_section(low, high, 0.5, &mut at)?;
     let (octave, best_ms) = ends.into_iter().fold(inner, |best, end| if end.1 < best.1 { end } else { best });

@@ -1,7 +1,7 @@
 //! Voxelizing meshes that are on the GPU, into voxels that stay there.
 
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, CpuBackend, Grid, Job, Mode, Strategy, Volume, WORD_BITS};
+use trixel::{Backend, CpuBackend, Job, Mode, Strategy, Volume, WORD_BITS};
 
 use crate::counters::{self, Counters};
 use crate::cutoff::{Cutoff, Dilation};
@@ -9,8 +9,9 @@ use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::limits::MAX_PAIRS;
 use crate::mesh::GpuMesh;
-use crate::passes::{self, Scratch};
+use crate::passes;
 use crate::probe;
+use crate::scratch::{Lists, Scratch};
 use crate::shader::Variant;
 use crate::timer::{PassTime, Timer};
 use crate::volume::GpuVolume;
@@ -72,20 +73,21 @@ pub struct Voxelizer {
 /// \[HCV\] chapter 5's pre-classified form for static meshes.
 #[derive(Debug)]
 pub struct Classification {
-    pub(crate) units: Vec<passes::Lists>,
+    pub(crate) units: Vec<Lists>,
     pub(crate) mode: Mode,
     pub(crate) dilation: Dilation,
 }
 
 impl Voxelizer {
-    /// A voxelizer for a job. The first one of its mode and strategy on a device voxelizes a small nasty scene and compares
-    /// with the CPU.
+    /// A voxelizer for a job. The first one of its mode, strategy and options on a device builds their pipelines, voxelizes a
+    /// small nasty scene and compares with the CPU.
     ///
     /// # Errors
     /// When the job's strategy is not the GPU's, the device computes wrong voxels, or memory runs out.
     pub fn new(gpu: &Gpu, job: &Job, options: &Options) -> Result<Self, GpuError> {
         let voxelizer = Self::unchecked(gpu, job, options)?;
-        probe::check(gpu, job.mode(), voxelizer.strategy)?;
+        let Self { strategy, cutoff, dilation, variant, .. } = voxelizer;
+        probe::check(gpu, probe::Checked { variant, strategy, heuristic: cutoff.heuristic, dilation })?;
         Ok(voxelizer)
     }
 
@@ -120,28 +122,13 @@ impl Voxelizer {
         self.cutoff
     }
 
-    /// Builds the pipelines, which the first run would do otherwise.
-    ///
-    /// # Errors
-    /// When a shader is refused or memory runs out.
-    pub fn prepare(&mut self) -> Result<(), GpuError> {
-        let nothing = GpuMesh::empty(&self.gpu)?;
-        let grid = Grid::new([0.0; 3], [1.0; 3], [1; 3]).map_err(trixel::Error::from)?;
-        let volume = GpuVolume::new(&self.gpu, grid)?;
-        let mode = self.job.mode();
-        let job = std::mem::replace(&mut self.job, Job::new(grid, mode));
-        let ran = self.run(&nothing, &volume);
-        self.job = job;
-        ran
-    }
-
-    /// Changes the cutoff for the runs that follow.
-    pub fn set_cutoff(&mut self, cutoff: Cutoff) {
-        self.cutoff = cutoff;
+    /// Changes the cutoff's value for the runs that follow.
+    pub fn set_cutoff(&mut self, value: f32) {
+        self.cutoff.value = value;
     }
 
     /// Records everything that overwrites `volume` with the voxels of `mesh`. Nothing runs before the encoder's commands
-    /// are submitted; call [`Voxelizer::check`] after that.
+    /// are submitted; call [`Voxelizer::check`] after that, and before the next recording, which counts anew.
     ///
     /// # Errors
     /// When the volume's grid is not the job's, a shader is refused, or memory runs out.
@@ -159,12 +146,10 @@ impl Voxelizer {
     /// # Errors
     /// As for [`Voxelizer::record`].
     pub fn classify(&mut self, mesh: &GpuMesh, volume: &GpuVolume) -> Result<Classification, GpuError> {
-        let mut encoder = self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let mut recorder = self.recorder(mesh, volume)?;
-        let classification = recorder.classify_all(&mut encoder)?;
-        self.gpu.guarded(|| self.gpu.queue().submit([encoder.finish()]))?;
-        self.check()?;
-        Ok(classification)
+        self.submit(|voxelizer, encoder| {
+            let gpu = voxelizer.gpu.clone();
+            gpu.guarded(|| passes::record_classification(voxelizer.setting(mesh, volume)?, encoder))?
+        })
     }
 
     /// [`Voxelizer::record`] with the classification made before: the second half of [`Strategy::HybridTwoPass`].
@@ -193,17 +178,19 @@ impl Voxelizer {
         let initial = self.cpu_part(mesh)?;
         let gpu = self.gpu.clone();
         // One guard around everything: most of what is recorded is only checked by the driver much later.
-        gpu.guarded(|| self.recorder(mesh, volume)?.record(encoder, strategy, classification, initial.as_ref()))?
+        gpu.guarded(|| {
+            passes::record(self.setting(mesh, volume)?, encoder, strategy, classification, initial.as_ref())
+        })?
     }
 
-    fn recorder<'a>(&'a mut self, mesh: &'a GpuMesh, volume: &'a GpuVolume) -> Result<passes::Recorder<'a>, GpuError> {
+    fn setting<'a>(&'a mut self, mesh: &'a GpuMesh, volume: &'a GpuVolume) -> Result<passes::Setting<'a>, GpuError> {
         if volume.grid() != self.job.grid() {
             return Err(GpuError::GridMismatch);
         }
         if let Some(timer) = &mut self.timer {
             timer.restart();
         }
-        passes::Recorder::new(passes::Setting {
+        Ok(passes::Setting {
             gpu: &self.gpu,
             job: &self.job,
             variant: self.variant,
@@ -246,45 +233,55 @@ impl Voxelizer {
     /// # Errors
     /// As for [`Voxelizer::record`] and [`Voxelizer::check`].
     pub fn run(&mut self, mesh: &GpuMesh, volume: &GpuVolume) -> Result<(), GpuError> {
-        let mut encoder = self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.record(&mut encoder, mesh, volume)?;
-        self.gpu.guarded(|| self.gpu.queue().submit([encoder.finish()]))?;
-        self.check().map(drop)
+        self.submit(|voxelizer, encoder| voxelizer.record(encoder, mesh, volume))
     }
 
     /// [`Voxelizer::run`] with a classification made before.
     ///
     /// # Errors
-    /// As for [`Voxelizer::run`].
+    /// As for [`Voxelizer::record_classified`] and [`Voxelizer::check`].
     pub fn run_classified(
         &mut self,
         mesh: &GpuMesh,
         volume: &GpuVolume,
         classification: &Classification,
     ) -> Result<(), GpuError> {
+        self.submit(|voxelizer, encoder| voxelizer.record_classified(encoder, mesh, volume, classification))
+    }
+
+    /// Submits what `record` records, waits and checks.
+    fn submit<T>(
+        &mut self,
+        record: impl FnOnce(&mut Self, &mut wgpu::CommandEncoder) -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
         let mut encoder = self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.record_classified(&mut encoder, mesh, volume, classification)?;
+        let recorded = record(self, &mut encoder)?;
         self.gpu.guarded(|| self.gpu.queue().submit([encoder.finish()]))?;
-        self.check().map(drop)
+        self.check()?;
+        Ok(recorded)
     }
 
     /// Waits for what was recorded last, once it is submitted, and says whether its result is whole; gives the counters,
     /// which are 0 unless asked for.
     ///
     /// # Errors
-    /// When triangles were too large or columns too many, so that the result must not be used, or the device is lost.
+    /// When triangles were too large or columns too many, so that the result must not be used, nothing was submitted, or the
+    /// device is lost.
     pub fn check(&self) -> Result<Counters, GpuError> {
-        let (staging, bytes) = self.scratch.status();
-        let (counters, too_large, overflown) = self.gpu.read(staging, bytes, |bytes| {
+        let status = self.scratch.status();
+        let (counters, too_large, words) = self.gpu.read(&status.buffer, status.bytes(), |bytes| {
             let (counters, too_large) = counters::parse(bytes);
-            let totals = bytes.get(usize::try_from(counters::BYTES).unwrap_or(usize::MAX)..).unwrap_or(&[]);
-            let totals = totals.as_chunks::<4>().0;
-            (counters, too_large, totals.iter().any(|total| u32::from_le_bytes(*total) > MAX_PAIRS))
+            let after = bytes.get(usize::try_from(counters::BYTES).unwrap_or(usize::MAX)..).unwrap_or(&[]);
+            let words: Vec<u32> = after.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
+            (counters, too_large, words)
         })?;
+        let Some((_, totals)) = words.split_last().filter(|(run, _)| **run != 0 && **run == status.run) else {
+            return Err(GpuError::NotSubmitted);
+        };
         if too_large > 0 {
             return Err(GpuError::TrianglesTooLarge(too_large));
         }
-        if overflown {
+        if totals.iter().any(|total| *total > MAX_PAIRS) {
             return Err(GpuError::TooManyColumns);
         }
         Ok(counters)

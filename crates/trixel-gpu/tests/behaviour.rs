@@ -122,6 +122,59 @@ fn triangles_beyond_the_shaders_arithmetic_go_to_the_cpu() {
     }
 }
 
+#[test]
+fn dilated_triangles_may_reach_far_outside() {
+    // Needles and fans whose corners lie up to 8000 pixels beyond a small target, where drivers clip.
+    let mut state = 7u64;
+    let mut next = |low: f64, high: f64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (state >> 40) as f64 / f64::from(1 << 24)
+    };
+    let soup: Vec<[[f64; 3]; 3]> = (0..60)
+        .map(|_| {
+            // Through a point of the grid, and away from it.
+            let through: [f64; 3] = std::array::from_fn(|_| next(2.0, 18.0));
+            let u: [f64; 3] = std::array::from_fn(|_| next(-3900.0, 3900.0));
+            let v: [f64; 3] = std::array::from_fn(|_| next(-900.0, 900.0));
+            let at = |a: f64, b: f64| std::array::from_fn(|axis| through[axis] + a * u[axis] + b * v[axis]);
+            [at(1.0, 0.5), at(-1.0, 0.4), at(0.1, -1.0)]
+        })
+        .collect();
+    let grid = unit_grid([20, 21, 22]);
+    let mesh = zoo::soup(&soup);
+    let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
+    for driver in DRIVERS {
+        let gpu = open(driver);
+        assert_eq!(GpuMesh::upload(&gpu, &lattice).unwrap().cpu_triangles(), 0);
+        for mode in Mode::ALL {
+            let job = Job::new(grid, mode).with_strategy(Strategy::FragmentParallel);
+            let expected = on_cpu(&lattice, &job);
+            assert!(expected.count() > 1000);
+            for dilation in Dilation::ALL {
+                let (found, _) = on_gpu(&gpu, &lattice, &job, &Options { dilation, ..Options::default() });
+                assert!(found == expected, "{driver} {mode} {}", dilation.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_check_before_the_submission_is_refused() {
+    let gpu = open("llvmpipe");
+    let mesh = zoo::octahedron([4.0; 3], 3.0);
+    let grid = unit_grid([8; 3]);
+    let on_gpu = GpuMesh::upload(&gpu, &LatticeMesh::snap(&mesh, &grid).unwrap()).unwrap();
+    let voxels = GpuVolume::new(&gpu, grid).unwrap();
+    let mut voxelizer = Voxelizer::new(&gpu, &Job::new(grid, Mode::Solid), &Options::default()).unwrap();
+    assert!(matches!(voxelizer.check(), Err(GpuError::NotSubmitted)), "nothing recorded");
+    voxelizer.run(&on_gpu, &voxels).unwrap();
+    let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    voxelizer.record(&mut encoder, &on_gpu, &voxels).unwrap();
+    assert!(matches!(voxelizer.check(), Err(GpuError::NotSubmitted)), "only the run before was submitted");
+    gpu.queue().submit([encoder.finish()]);
+    voxelizer.check().unwrap();
+}
+
 /// A device whose bindings hold little, so that meshes and grids are cut.
 fn small_device(binding_bytes: u64, target: u32) -> Gpu {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());

@@ -15,19 +15,13 @@ fn classify(
     if i >= params.triangles {
         return;
     }
-    if COUNTING {
-        count(COUNT_INVOCATIONS, 1u);
-    }
-    let shape = shape_of(corners(i));
-    count_too_large(shape.flags);
-    if (shape.flags & EMPTY) != 0u {
+    let look = look_at(i);
+    if look.columns == 0u {
         return;
     }
-    let columns = rect_columns(column_rect(shape.base, shape.extent, shape.flags & AXIS_MASK));
-    let fits = columns <= params.max_columns && is_small(shape.extent);
-    if !fits || size_of(shape) >= params.cutoff {
+    if !fits_one_invocation(look) || size_of(look.shape) >= params.cutoff {
         large[atomicAdd(&large_count, 1u)] = i;
-    } else if columns > 0u {
+    } else {
         small[atomicAdd(&small_count, 1u)] = i;
     }
 }

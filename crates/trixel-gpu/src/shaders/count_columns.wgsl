@@ -9,17 +9,7 @@ fn count_columns(
     @builtin(local_invocation_index) local: u32,
 ) {
     let i = invocation(group, groups, local);
-    if i >= params.triangles {
-        return;
+    if i < params.triangles {
+        columns[i] = look_at(i).columns;
     }
-    if COUNTING {
-        count(COUNT_INVOCATIONS, 1u);
-    }
-    let shape = shape_of(corners(i));
-    count_too_large(shape.flags);
-    var n = 0u;
-    if (shape.flags & EMPTY) == 0u {
-        n = rect_columns(column_rect(shape.base, shape.extent, shape.flags & AXIS_MASK));
-    }
-    columns[i] = n;
 }

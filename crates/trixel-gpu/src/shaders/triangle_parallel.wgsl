@@ -16,24 +16,14 @@ fn triangle_parallel(
     if i >= params.triangles {
         return;
     }
-    if COUNTING {
-        count(COUNT_INVOCATIONS, 1u);
-    }
-    let shape = shape_of(corners(i));
-    count_too_large(shape.flags);
-    if (shape.flags & EMPTY) != 0u {
+    let look = look_at(i);
+    if look.columns == 0u {
         return;
     }
-    let rect = column_rect(shape.base, shape.extent, shape.flags & AXIS_MASK);
-    let columns = rect_columns(rect);
-    if columns == 0u {
-        return;
-    }
-    let fits = columns <= params.max_columns && is_small(shape.extent);
-    if !fits || (HYBRID && size_of(shape) >= params.cutoff) {
+    if !fits_one_invocation(look) || (HYBRID && size_of(look.shape) >= params.cutoff) {
         list[atomicAdd(&listed, 1u)] = i;
         return;
     }
-    voxelize_columns(triangle_of(shape), 0u);
+    voxelize_columns(triangle_of(look.shape), 0u);
     flush_counters();
 }
