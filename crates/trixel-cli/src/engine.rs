@@ -102,6 +102,11 @@ impl Engine {
         Ok(Self::Gpu { gpu: Box::new(gpu), options, cpu_may_help: !asked && !of_gpu })
     }
 
+    /// Whether the CPU may do the work: no GPU was asked for, though `auto` may have found one.
+    pub(crate) fn cpu_may_compute(&self) -> bool {
+        matches!(self, Self::Cpu | Self::Gpu { cpu_may_help: true, .. })
+    }
+
     /// Voxelizes `repeat` times.
     pub(crate) fn run(
         &self,

@@ -113,8 +113,7 @@ pub struct Cutoff {
 impl Cutoff {
     /// The default for a kind of adapter.
     ///
-    /// Software adapters: measured on lavapipe, where a fragment costs about as much as a column in a loop, but a
-    /// triangle's set-up in the rasterizer some hundred columns. Real GPUs: the 2 to 4 square voxels of \[HCV\] 3.3.
+    /// Software adapters: measured on lavapipe, see docs/gpu.md. Real GPUs: the 2 to 4 square voxels of \[HCV\] 3.3.
     #[must_use]
     pub fn default_for(adapter: &AdapterInfo, heuristic: Heuristic) -> Self {
         let area = if adapter.software { 64.0 } else { 4.0 };

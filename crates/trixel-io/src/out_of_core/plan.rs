@@ -132,8 +132,11 @@ impl std::fmt::Display for Plan {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let [rows_x, rows_y] = self.rows;
         let [x, y, z] = self.tile;
-        write!(f, "plan: {} tiles of 64 x {y} x {z} voxels in {} slabs", rows_x * rows_y, self.slabs.len())?;
-        write!(f, " of at most {x} layers; at most {} of memory", Bytes(self.memory))?;
+        let many = |count: u64, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+        let (tiles, slabs) =
+            (many(u64::from(rows_x) * u64::from(rows_y), "tile"), many(self.slabs.len() as u64, "slab"));
+        write!(f, "plan: {tiles} of 64 x {y} x {z} voxels in {slabs} of at most {x} layers; ")?;
+        write!(f, "at most {} of memory", Bytes(self.memory))?;
         if self.bytes_to_read > 0 {
             write!(f, "; {} to read", Bytes(self.bytes_to_read))?;
         }
