@@ -75,6 +75,7 @@ pub(crate) struct AdapterReport {
     pub(crate) driver: String,
     pub(crate) backend: String,
     pub(crate) software: bool,
+    pub(crate) tier: &'static str,
 }
 
 impl From<&AdapterInfo> for AdapterReport {
@@ -84,6 +85,7 @@ impl From<&AdapterInfo> for AdapterReport {
             driver: info.driver.clone(),
             backend: info.backend.clone(),
             software: info.software,
+            tier: info.tier.name(),
         }
     }
 }

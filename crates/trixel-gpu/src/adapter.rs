@@ -1,6 +1,7 @@
 //! Which GPU: finding, naming and choosing adapters.
 
 use crate::error::GpuError;
+use crate::tier::Tier;
 
 /// What is known about an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -13,16 +14,19 @@ pub struct AdapterInfo {
     pub backend: String,
     /// Whether the "GPU" is a program on the CPU.
     pub software: bool,
+    /// The best tier of shaders that it allows; of an open device, the one in use.
+    pub tier: Tier,
 }
 
 impl AdapterInfo {
-    pub(crate) fn new(info: &wgpu::AdapterInfo) -> Self {
+    pub(crate) fn new(info: &wgpu::AdapterInfo, features: wgpu::Features) -> Self {
         let driver = format!("{} {}", info.driver, info.driver_info);
         Self {
             name: info.name.clone(),
             driver: driver.trim().to_owned(),
             backend: info.backend.to_str().to_owned(),
             software: info.device_type == wgpu::DeviceType::Cpu,
+            tier: Tier::best(features),
         }
     }
 
@@ -34,7 +38,7 @@ impl AdapterInfo {
 
 impl std::fmt::Display for AdapterInfo {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} ({}, {}", self.name, self.driver, self.backend)?;
+        write!(f, "{} ({}, {}, {}", self.name, self.driver, self.backend, self.tier.name())?;
         f.write_str(if self.software { ", software)" } else { ")" })
     }
 }
@@ -71,7 +75,7 @@ fn enumerate(instance: &wgpu::Instance) -> Vec<(wgpu::Adapter, AdapterInfo)> {
     adapters
         .into_iter()
         .map(|(_, adapter)| {
-            let info = AdapterInfo::new(&adapter.get_info());
+            let info = AdapterInfo::new(&adapter.get_info(), adapter.features());
             (adapter, info)
         })
         .collect()

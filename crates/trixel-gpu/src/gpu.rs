@@ -37,7 +37,8 @@ impl Gpu {
     /// When there is no such adapter or it gives no device.
     pub fn open(choice: &AdapterChoice) -> Result<Self, GpuError> {
         let (adapter, info) = adapter::choose(choice)?;
-        let features = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
+        let wanted = info.tier.features() | wgpu::Features::TIMESTAMP_QUERY;
+        let features = adapter.features() & wanted;
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("trixel"),
             required_features: features,
@@ -62,7 +63,7 @@ impl Gpu {
     /// [`GpuError::Refused`].
     #[must_use]
     pub fn from_device(device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        let info = AdapterInfo::new(&device.adapter_info());
+        let info = AdapterInfo::new(&device.adapter_info(), device.features());
         Self::with_info(device, queue, info)
     }
 

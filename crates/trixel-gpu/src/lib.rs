@@ -1,7 +1,7 @@
 //! Exact mesh voxelization on any GPU, through wgpu: \[HCV\] chapter 3.
 //!
-//! Every strategy gives precisely the voxels that [`trixel::Mode`] defines, on every driver. The shaders use what WebGPU has
-//! everywhere: 32-bit integers and floats, storage buffers, atomics, and a rasterizer. Floats only ever estimate, with an
+//! Every strategy gives precisely the voxels that [`trixel::Mode`] defines, on every driver. The shaders need what WebGPU has
+//! everywhere: 32-bit integers and floats, storage buffers, atomics, and a rasterizer; a [`Tier`] says what more they use. Floats only ever estimate, with an
 //! error bound; what they leave open is decided in integers of 64 and 96 bits.
 //!
 //! Uploading, voxelizing and reading back are separate: [`GpuMesh`], [`Voxelizer`], [`GpuVolume`]. [`GpuBackend`] does all
@@ -22,6 +22,7 @@ mod probe;
 mod scratch;
 mod shader;
 mod texture;
+mod tier;
 mod timer;
 mod tune;
 mod volume;
@@ -37,6 +38,7 @@ pub use error::GpuError;
 pub use gpu::Gpu;
 pub use limits::MAX_EXTENT;
 pub use mesh::GpuMesh;
+pub use tier::Tier;
 pub use timer::PassTime;
 pub use tune::{Sample, Tuning, measure, tune};
 pub use volume::{GpuVolume, Slab};

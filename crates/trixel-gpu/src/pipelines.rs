@@ -146,7 +146,7 @@ impl Pipelines {
     pub(crate) fn compute(&self, gpu: &Gpu, stage: Stage, variant: Variant) -> wgpu::ComputePipeline {
         keep(&self.compute, (stage, variant), || {
             let label = Some(stage.entry_point());
-            let source = shader::source(stage, variant, gpu.limits().groups);
+            let source = shader::source(stage, variant, gpu.info().tier, gpu.limits().groups);
             let (module, layout) = module_and_layout(gpu.device(), label, source, &self.layouts.of(stage));
             gpu.device().create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label,
@@ -163,7 +163,7 @@ impl Pipelines {
     pub(crate) fn raster(&self, gpu: &Gpu, raster: Raster, variant: Variant) -> wgpu::RenderPipeline {
         keep(&self.raster, (raster, variant), || {
             let label = Some(Raster::FRAGMENT_ENTRY_POINT);
-            let source = shader::raster_source(raster, variant);
+            let source = shader::raster_source(raster, variant, gpu.info().tier);
             let layouts = [Some(&self.layouts.common), Some(&self.layouts.list_draw)];
             let (module, layout) = module_and_layout(gpu.device(), label, source, &layouts);
             gpu.device().create_render_pipeline(&wgpu::RenderPipelineDescriptor {

@@ -4,6 +4,7 @@ use trixel::Mode;
 
 use crate::cutoff::{Dilation, Heuristic};
 use crate::limits::{MAX_EXTENT, MAX_PAIRS};
+use crate::tier::Tier;
 
 macro_rules! shader {
     ($($file:literal)*) => { &[$(include_str!(concat!("shaders/", $file, ".wgsl"))),*] };
@@ -96,7 +97,7 @@ impl Variant {
 }
 
 /// The WGSL of a compute stage.
-pub(crate) fn source(stage: Stage, variant: Variant, max_groups: u32) -> String {
+pub(crate) fn source(stage: Stage, variant: Variant, tier: Tier, max_groups: u32) -> String {
     let small = matches!(stage, Stage::TriangleParallel { .. } | Stage::TriangleList { small: true });
     let mut constants = format!("const SMALL: bool = {small};\n");
     match stage {
@@ -111,18 +112,18 @@ pub(crate) fn source(stage: Stage, variant: Variant, max_groups: u32) -> String 
         }
         _ => {}
     }
-    assemble(variant, &constants, stage.files())
+    assemble(variant, tier, &constants, stage.files())
 }
 
 /// The WGSL of a vertex and a fragment stage.
-pub(crate) fn raster_source(raster: Raster, variant: Variant) -> String {
+pub(crate) fn raster_source(raster: Raster, variant: Variant, tier: Tier) -> String {
     let (listed, dilation) = (raster.listed, raster.dilation.code());
     let constants =
         format!("const SMALL: bool = false;\nconst LISTED: bool = {listed};\nconst DILATION: u32 = {dilation}u;\n");
-    assemble(variant, &constants, Raster::FILES)
+    assemble(variant, tier, &constants, Raster::FILES)
 }
 
-fn assemble(variant: Variant, constants: &str, files: &[&str]) -> String {
+fn assemble(variant: Variant, tier: Tier, constants: &str, files: &[&str]) -> String {
     let mode = match variant.mode {
         Mode::Conservative => 0,
         Mode::Thin => 1,
@@ -133,7 +134,11 @@ fn assemble(variant: Variant, constants: &str, files: &[&str]) -> String {
     let shared = format!(
         "const MODE: u32 = {mode}u;\nconst COUNTING: bool = {counting};\nconst MAX_EXTENT: u32 = {MAX_EXTENT}u;\n"
     );
-    [&[shared.as_str(), constants], files].concat().join("\n")
+    let product = match tier {
+        Tier::Portable => include_str!("shaders/product_portable.wgsl"),
+        Tier::Int64 => include_str!("shaders/product_int64.wgsl"),
+    };
+    [&[shared.as_str(), constants, product], files].concat().join("\n")
 }
 
 #[cfg(test)]
@@ -150,12 +155,15 @@ mod tests {
         variants
     };
 
-    /// naga accepts it, with nothing but what WebGPU has everywhere.
-    fn assert_valid(source: &str, entry_points: &[&str]) {
+    /// naga accepts it, with nothing but what the tier has beyond WebGPU.
+    fn assert_valid(source: &str, tier: Tier, entry_points: &[&str]) {
+        let capabilities = match tier {
+            Tier::Portable => naga::valid::Capabilities::empty(),
+            Tier::Int64 => naga::valid::Capabilities::SHADER_INT64,
+        };
         let module = naga::front::wgsl::parse_str(source)
             .unwrap_or_else(|error| panic!("{entry_points:?}: {}", error.emit_to_string(source)));
-        let (flags, capabilities) = (naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
-        naga::valid::Validator::new(flags, capabilities)
+        naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities)
             .validate(&module)
             .unwrap_or_else(|error| panic!("{entry_points:?}: {}", error.emit_to_string(source)));
         for name in entry_points {
@@ -183,7 +191,9 @@ mod tests {
         }
         for stage in stages {
             for variant in VARIANTS {
-                assert_valid(&source(stage, variant, 65_535), &[stage.entry_point()]);
+                for tier in Tier::ALL {
+                    assert_valid(&source(stage, variant, tier, 65_535), tier, &[stage.entry_point()]);
+                }
             }
         }
     }
@@ -193,8 +203,10 @@ mod tests {
         for dilation in Dilation::ALL {
             for listed in [false, true] {
                 for variant in VARIANTS {
-                    let source = raster_source(Raster { listed, dilation }, variant);
-                    assert_valid(&source, &[Raster::VERTEX_ENTRY_POINT, Raster::FRAGMENT_ENTRY_POINT]);
+                    for tier in Tier::ALL {
+                        let source = raster_source(Raster { listed, dilation }, variant, tier);
+                        assert_valid(&source, tier, &[Raster::VERTEX_ENTRY_POINT, Raster::FRAGMENT_ENTRY_POINT]);
+                    }
                 }
             }
         }

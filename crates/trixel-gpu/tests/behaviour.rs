@@ -6,7 +6,8 @@ use trixel::conformance::zoo;
 use trixel::lattice::LatticeMesh;
 use trixel::{Backend, CpuBackend, Grid, Job, Mesh, Mode, Strategy, Volume};
 use trixel_gpu::{
-    AdapterChoice, Cutoff, Dilation, Gpu, GpuError, GpuMesh, GpuVolume, Heuristic, Options, STRATEGIES, Voxelizer, wgpu,
+    AdapterChoice, Cutoff, Dilation, Gpu, GpuError, GpuMesh, GpuVolume, Heuristic, Options, STRATEGIES, Tier,
+    Voxelizer, wgpu,
 };
 
 const DRIVERS: [&str; 2] = ["llvmpipe", "SwiftShader"];
@@ -188,6 +189,19 @@ fn small_device(binding_bytes: u64, target: u32) -> Gpu {
     let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
     let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
     Gpu::from_device(device, queue)
+}
+
+#[test]
+fn every_tier_gives_the_same() {
+    // What `Gpu::open` finds on lavapipe is more than a device of the default limits and features has.
+    let best = open("llvmpipe");
+    let portable = small_device(1 << 27, 8192);
+    assert_eq!((best.info().tier, portable.info().tier), (Tier::Int64, Tier::Portable));
+    let mesh = trixel::scene::build("room:8").unwrap();
+    let grid = Grid::fit(&mesh.bounds().unwrap(), 150).unwrap();
+    for gpu in [best, portable] {
+        compare(&gpu, "room", &mesh, grid, &Mode::ALL);
+    }
 }
 
 #[test]

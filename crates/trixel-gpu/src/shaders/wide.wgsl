@@ -1,13 +1,5 @@
 // Integers wider than WGSL has, in two's complement, low word first: 64 bits in a vec2<u32>, 96 in a vec3<u32>.
-
-fn mul_u32(a: u32, b: u32) -> vec2<u32> {
-    let low = (a & 0xffffu) * (b & 0xffffu);
-    let left = (a >> 16u) * (b & 0xffffu);
-    let right = (a & 0xffffu) * (b >> 16u);
-    let middle = (low >> 16u) + (left & 0xffffu) + (right & 0xffffu);
-    let high = (a >> 16u) * (b >> 16u) + (left >> 16u) + (right >> 16u) + (middle >> 16u);
-    return vec2<u32>((middle << 16u) | (low & 0xffffu), high);
-}
+// The tier's product is prepended.
 
 fn i64_from(a: i32) -> vec2<u32> {
     return vec2<u32>(bitcast<u32>(a), bitcast<u32>(a >> 31u));
