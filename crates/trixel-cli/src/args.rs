@@ -51,7 +51,7 @@ pub(crate) enum Command {
     },
 }
 
-const VOXELIZE_USAGE: &str = "trixel voxelize <INPUT> -o <OUT> [-o <OUT>...] [OPTIONS]";
+const VOXELIZE_USAGE: &str = "trixel voxelize <INPUT>... -o <OUT> [-o <OUT>...] [OPTIONS]";
 
 fn voxelize_about() -> String {
     format!(
@@ -68,15 +68,19 @@ Examples:
   trixel voxelize part.stl --voxel-size 0.25 --mode solid -o part.vti
   trixel voxelize city.glb --dims 512 512 128 --origin 0 0 0 --voxel-size 1 -o city.vox
   trixel voxelize moved.obj --like before.npz -o after.npz
+  trixel voxelize hull.stl cargo.stl -r 256 --attributes material --priority cargo,hull -o ship.npz
   trixel voxelize spot.obj -r 256 --attributes color,normal --sparse -o spot.npz -o spot.vox
 
 Exit status: 0 done, 1 failed (one message on standard error says what, where, and what to do), 2 wrong usage.";
 
 #[derive(Debug, Args)]
 pub(crate) struct VoxelizeArgs {
-    /// A mesh file, or scene:NAME or scene:NAME:N.
+    /// A mesh file, or scene:NAME or scene:NAME:N; several share one grid.
+    ///
+    /// Of several, a material is called STEM/MATERIAL after its file (scene.glb's `glass` is `scene/glass`), or STEM if it
+    /// has no name; triangles without a material get one of that name.
     #[arg(value_name = "INPUT")]
-    pub(crate) input: Option<String>,
+    pub(crate) inputs: Vec<String>,
 
     /// Write the voxels here; may be given several times.
     ///
@@ -150,7 +154,7 @@ pub(crate) struct AttributeArgs {
     pub(crate) combine: CombineArg,
 
     /// Materials from the one that matters most to the one that matters least; those not named come last. Only the
-    /// triangles of the first that a voxel has count in it.
+    /// triangles of the first that a voxel has count in it. Of several INPUTs, STEM stands for all materials of one.
     #[arg(long, value_delimiter = ',', value_name = "MATERIAL,...", requires = "attributes")]
     pub(crate) priority: Vec<String>,
 }

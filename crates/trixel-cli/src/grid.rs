@@ -21,12 +21,19 @@ pub(crate) enum GridRequest {
 }
 
 impl GridRequest {
-    /// Reads the arguments. An input path that `--voxel-size` swallowed, since it takes one to three values, is handed
-    /// back in `input`.
-    pub(crate) fn from_args(args: &GridArgs, input: &mut Option<String>) -> Self {
+    /// Reads the arguments. Input paths that `--voxel-size` swallowed, since it takes one to three values, are handed
+    /// back in `inputs`.
+    pub(crate) fn from_args(args: &GridArgs, inputs: &mut Vec<String>) -> Self {
         let mut sizes = args.voxel_size.clone();
-        if input.is_none() && sizes.len() > 1 && sizes.last().is_some_and(|last| last.parse::<f64>().is_err()) {
-            *input = sizes.pop();
+        let numbers = sizes.iter().rposition(|text| text.parse::<f64>().is_ok()).map_or(0, |last| last + 1);
+        if numbers > 0 && numbers < sizes.len() {
+            if !inputs.is_empty() {
+                usage(&format!(
+                    "--voxel-size: `{}` is not a positive number; inputs go before the options, or after `--`",
+                    sizes[numbers]
+                ));
+            }
+            *inputs = sizes.split_off(numbers);
         }
         let voxel_size = match *sizes.iter().map(|text| positive(text)).collect::<Vec<_>>() {
             [] => None,

@@ -57,15 +57,19 @@ enum Input {
 }
 
 impl Input {
-    /// Reads the mesh, unless that would take more than half the limit and it can be read in passes.
-    fn open(input: &str, limit: u64, reporter: &Reporter) -> Result<Self> {
+    /// Reads the meshes; a single one that would take more than half the limit in passes, if it can be.
+    fn open(inputs: &[String], limit: u64, reporter: &Reporter) -> Result<Self> {
         /// Bytes in memory of a byte of a binary file: the file, the mesh and its lattice.
         const GROWTH: u64 = 4;
-        let large = std::fs::metadata(input).is_ok_and(|file| file.len().saturating_mul(GROWTH) > limit / 2);
-        if large && let Some(stream) = MeshStream::open(Path::new(input))? {
+        let large =
+            |input: &str| std::fs::metadata(input).is_ok_and(|file| file.len().saturating_mul(GROWTH) > limit / 2);
+        if let [input] = inputs
+            && large(input)
+            && let Some(stream) = MeshStream::open(Path::new(input))?
+        {
             return Ok(Self::Stream(stream));
         }
-        Ok(Self::Mesh(mesh::load(input, false, reporter)?))
+        Ok(Self::Mesh(mesh::load_all(inputs, false, reporter)?))
     }
 
     fn source(&self) -> Source<'_> {
@@ -84,8 +88,12 @@ impl Input {
     }
 }
 
-/// Names the input and its state, so that nothing is resumed with another.
-fn identity(input: &str) -> String {
+/// Names the inputs and their state, so that nothing is resumed with others.
+fn identity(inputs: &[String]) -> String {
+    inputs.iter().map(|input| identity_of(input)).collect::<Vec<_>>().join("; ")
+}
+
+fn identity_of(input: &str) -> String {
     let state = std::fs::metadata(input).ok().map(|file| {
         let modified = file.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
         format!("{} bytes, modified {:?}", file.len(), modified.unwrap_or_default())
@@ -94,17 +102,12 @@ fn identity(input: &str) -> String {
     format!("{path}, {}", state.unwrap_or_default())
 }
 
-pub(crate) fn run(
-    args: &VoxelizeArgs,
-    input: &str,
-    target: &Path,
-    request: &GridRequest,
-    start: Instant,
-) -> Result<ExitCode> {
+pub(crate) fn run(args: &VoxelizeArgs, target: &Path, request: &GridRequest, start: Instant) -> Result<ExitCode> {
     let reporter = Reporter::new(args.quiet);
     check_target(target)?;
     let limit = args.memory_limit.or_else(memory::available_for_voxels).unwrap_or(u64::MAX);
-    let (opened, read_ms) = reporter.stage(&format!("reading {input}"), || Input::open(input, limit, &reporter));
+    let reading = format!("reading {}", args.inputs.join(", "));
+    let (opened, read_ms) = reporter.stage(&reading, || Input::open(&args.inputs, limit, &reporter));
     let opened = opened?;
     let source = opened.source();
     let (bounds, bounds_ms) = reporter.stage("measuring the mesh", || source.bounds());
@@ -124,7 +127,7 @@ pub(crate) fn run(
     let plan = plan?;
     reporter.say(&format!("{plan} (limit {})", Bytes(limit)));
 
-    let work = OutOfCore { source, job: &job, plan: &plan, backend: &backend, input: &identity(input) };
+    let work = OutOfCore { source, job: &job, plan: &plan, backend: &backend, input: &identity(&args.inputs) };
     let fraction = reporter.fractions();
     let (written, ms) = reporter.stage("voxelizing and writing", || work.write(target, args.resume, &fraction));
     let written = written.map_err(|error| match partial_path(target).is_dir() {

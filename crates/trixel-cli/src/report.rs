@@ -95,6 +95,8 @@ impl From<&AdapterInfo> for AdapterReport {
 pub(crate) struct AttributesReport {
     pub(crate) names: Vec<&'static str>,
     pub(crate) combine: &'static str,
+    /// What the numbers of materials mean, if these were asked for.
+    pub(crate) material_names: Vec<String>,
     /// Voxels that have a triangle; in a surface mode the others were cut out by an alpha test.
     pub(crate) covered: u64,
     /// Bytes that the attributes take in memory, and per set voxel.
@@ -109,6 +111,7 @@ impl From<&VoxelAttributes> for AttributesReport {
         Self {
             names: attributes.columns().iter().map(|(kind, _)| kind.name()).collect(),
             combine: attributes.combine().name(),
+            material_names: attributes.material_names().to_vec(),
             covered: attributes.covered(),
             bytes: attributes.bytes(),
             bytes_per_voxel,

@@ -18,9 +18,10 @@ use crate::voxelize::ContextOf;
 /// Characters of the longest bar.
 const BAR: f64 = 40.0;
 
-pub(crate) fn run(mut args: TuneArgs) -> Result<ExitCode> {
-    let request = GridRequest::from_args(&args.grid, &mut args.input);
-    let Some(input) = args.input else { usage("INPUT is missing: a mesh file, or scene:NAME") };
+pub(crate) fn run(args: TuneArgs) -> Result<ExitCode> {
+    let mut inputs = Vec::from_iter(args.input);
+    let request = GridRequest::from_args(&args.grid, &mut inputs);
+    let Ok([input]) = <[String; 1]>::try_from(inputs) else { usage("INPUT is missing: one mesh file, or scene:NAME") };
     let reporter = Reporter::new(false);
     let choice = args.adapter.map_or(AdapterChoice::Any, AdapterChoice::Named);
     let (gpu, _) = reporter.stage("opening the GPU", || Gpu::open(&choice));

@@ -24,36 +24,42 @@ use crate::{attributes, memory, mesh, out_of_core, volume};
 
 pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let start = Instant::now();
-    let request = GridRequest::from_args(&args.grid, &mut args.input);
-    let Some(input) = args.input.take() else { usage("INPUT is missing: a mesh file, or scene:NAME") };
+    let request = GridRequest::from_args(&args.grid, &mut args.inputs);
+    let Some(first) = args.inputs.first() else { usage("INPUT is missing: a mesh file, or scene:NAME") };
+    // For messages.
+    let input = args.inputs.join(", ");
     if args.outputs.is_empty() && args.report.is_none() {
         usage("nothing to write: give -o OUT (for example -o voxels.npz) or --report FILE.json");
     }
     check_method(&args.method);
     args.outputs.iter().try_for_each(|output| volume::check_extension(output))?;
-    check_paths(&input, &args.outputs, args.report.as_deref())?;
+    check_paths(&args.inputs, &args.outputs, args.report.as_deref())?;
     if let Some(report) = &args.report {
         // Dropped at once, which removes it: a report that cannot be written is known before the work.
         AtomicFile::create(report).map(drop).map_err(|error| volume::cannot_write(report, &error))?;
     }
     set_threads(&args.method)?;
     if let Some(target) = out_of_core::target(&args) {
-        return out_of_core::run(&args, &input, &target, &request, start);
+        return out_of_core::run(&args, &target, &request, start);
     }
     let reporter = Reporter::new(args.quiet);
     let mut stages = Stages::default();
 
-    let (loaded, read_ms) = reporter
-        .stage(&format!("reading {input}"), || mesh::load(&input, !args.attributes.attributes.is_empty(), &reporter));
+    let wants_attributes = !args.attributes.attributes.is_empty();
+    let (loaded, read_ms) =
+        reporter.stage(&format!("reading {input}"), || mesh::load_all(&args.inputs, wants_attributes, &reporter));
     let mut loaded = loaded?;
     stages.read = read_ms;
-    let up = args.up.axis().unwrap_or_else(|| mesh::up(&input, &loaded));
+    let up = args.up.axis().unwrap_or_else(|| mesh::up(first, &loaded));
 
     let job = job(&args.method, request.resolve(&loaded, &reporter)?)?;
     for output in &args.outputs {
         volume::check_output(output, job.grid())?;
     }
 
+    if let Some(warning) = attributes::unheld(&args.attributes, &args.outputs) {
+        reporter.warn(warning);
+    }
     let wanted = attributes::request(&args.attributes, &loaded)?;
     if wanted.is_some() {
         let (warnings, ms) = reporter.stage("decoding textures", || decode_textures(&mut loaded));
@@ -188,8 +194,8 @@ impl<T, E: std::error::Error + Send + Sync + 'static> ContextOf<T> for std::resu
     }
 }
 
-/// Refuses to write two outputs to one file, or over the input.
-fn check_paths(input: &str, outputs: &[PathBuf], report: Option<&Path>) -> Result<()> {
+/// Refuses to write two outputs to one file, or over an input.
+fn check_paths(inputs: &[String], outputs: &[PathBuf], report: Option<&Path>) -> Result<()> {
     let mut seen = BTreeSet::new();
     for path in outputs.iter().map(PathBuf::as_path).chain(report) {
         // However it is spelled; links are followed only where the folder exists, as it must for writing.
@@ -202,12 +208,9 @@ fn check_paths(input: &str, outputs: &[PathBuf], report: Option<&Path>) -> Resul
                 usage(&format!("{} would be written twice; give each output its own name", path.display()));
             }
         }
-        let same_file = match (path.canonicalize(), Path::new(input).canonicalize()) {
-            (Ok(output), Ok(input)) => output == input,
-            _ => false,
-        };
-        if same_file {
-            bail!("{} is the input; choose another output", path.display());
+        let full = path.canonicalize().ok();
+        if full.is_some() && inputs.iter().any(|input| Path::new(input).canonicalize().ok() == full) {
+            bail!("{} is an input; choose another output", path.display());
         }
     }
     Ok(())

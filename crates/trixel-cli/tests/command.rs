@@ -416,6 +416,47 @@ fn priorities_name_materials() {
 }
 
 #[test]
+fn several_inputs_share_one_grid_and_keep_their_names() {
+    let bench = Bench::new();
+    square(&bench);
+    // Through the square, and beyond.
+    bench.write("wall.obj", "v 0.3 0.3 -0.5\nv 0.7 0.4 0.5\nv 0.5 0.9 0.5\nf 1 2 3\n");
+    let both = "voxelize wall.obj square.obj -r 8 --attributes material --sparse";
+    bench.ok(&format!("{both} -o both.npz --report r.json"));
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("r.json")).unwrap()).unwrap();
+    assert_eq!(report["attributes"]["material_names"], serde_json::json!(["wall", "square/red", "square/blue"]));
+    // The union of both, each alone on the same grid.
+    let counts = ["wall.obj square.obj", "wall.obj", "square.obj"].map(|inputs| {
+        bench.ok(&format!("voxelize {inputs} --like both.npz -o one.npz"));
+        trixel_io::volume_read::read_volume(&bench.path("one.npz"), None).unwrap().volume
+    });
+    let [all, wall, flat] = counts;
+    assert!(all.words().iter().zip(wall.words().iter().zip(flat.words())).all(|(all, (a, b))| *all == a | b));
+    assert!(all != wall && all != flat);
+    // An input's name stands for all of its materials.
+    let read = |name: &str| std::fs::read(bench.path(name)).unwrap();
+    bench.ok(&format!("{both} --priority square,wall -o square.npz"));
+    bench.ok(&format!("{both} --priority square/blue,square/red,wall -o blue.npz"));
+    bench.ok(&format!("{both} --priority wall -o wall.npz"));
+    assert!(read("square.npz") != read("wall.npz") && read("square.npz") != read("blue.npz"));
+    bench.fails(1, &format!("{both} --priority squ -o green.npz"), &["squ", "wall, square/red"]);
+    // Swallowed by --voxel-size, and given back.
+    bench.ok("voxelize --voxel-size 0.25 wall.obj square.obj -o swallowed.npz");
+    bench.fails(2, "voxelize wall.obj --voxel-size 0.25 square.obj -o a.npz", &["inputs go before"]);
+    bench.fails(1, "voxelize wall.obj nothing.obj -o a.npz", &["nothing.obj"]);
+    bench.fails(1, "voxelize wall.obj square.obj -o square.obj", &["is an input"]);
+}
+
+#[test]
+fn attributes_that_no_output_holds_are_told_of() {
+    let bench = Bench::new();
+    let warned = bench.ok("voxelize scene:cube -r 4 --attributes color,normal -o a.vox");
+    assert!(warned.stderr.contains("no output holds normal:"), "{}", warned.stderr);
+    let silent = bench.ok("voxelize scene:cube -r 4 --attributes color,normal -o a.vox -o a.vti");
+    assert!(!silent.stderr.contains("no output holds"), "{}", silent.stderr);
+}
+
+#[test]
 fn sparse_outputs_take_grids_far_beyond_the_memory() {
     let bench = Bench::new();
     // Dense, 4 TiB.

@@ -50,4 +50,4 @@ pub mod volume_read;
 pub mod write;
 mod xml;
 
-pub use volume_format::VolumeFormat;
+pub use volume_format::{AttributeSupport, VolumeFormat};

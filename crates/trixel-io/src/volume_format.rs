@@ -31,6 +31,17 @@ pub enum VolumeFormat {
     Raw,
 }
 
+/// Which attributes of voxels a format holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum AttributeSupport {
+    /// None.
+    Nothing,
+    /// Colours.
+    Colors,
+    /// Every one.
+    All,
+}
+
 impl VolumeFormat {
     /// Every format.
     pub const ALL: [Self; 11] = [
@@ -75,6 +86,16 @@ impl VolumeFormat {
     #[must_use]
     pub fn takes_bricks(self) -> bool {
         matches!(self, Self::Npz | Self::Ply | Self::Vox)
+    }
+
+    /// Which attributes are written with the voxels.
+    #[must_use]
+    pub fn attributes(self) -> AttributeSupport {
+        match self {
+            Self::Npz | Self::Vti => AttributeSupport::All,
+            Self::Vox | Self::Obj | Self::Ply | Self::Glb => AttributeSupport::Colors,
+            Self::Npy | Self::Binvox | Self::Nrrd | Self::Stl | Self::Raw => AttributeSupport::Nothing,
+        }
     }
 
     /// Whether [`crate::volume_read`] reads the format back: those that hold voxels rather than faces, except `.vox`,

@@ -3,11 +3,11 @@
 //! Sparse, an attribute has one row for each row of `indices`. Dense, its array has the grid's dimensions before its own;
 //! voxels that are not set have zeros, and 2^32 - 1 for ids. Where every triangle of a voxel keeps a row
 //! ([`Combine::All`](trixel::attributes::Combine)), attributes are rows either way, and `offsets` (u64, N + 1) tells where
-//! those of each set voxel begin, in the order of x, y, z.
+//! those of each set voxel begin, in the order of x, y, z. Beside `material`, `material_names` says what the numbers mean.
 
 use std::io::{self, Seek, Write};
 
-use trixel::attributes::{Described, Values};
+use trixel::attributes::{AttributeKind, Described, Values};
 use trixel::set_bits;
 
 use super::NpzWriter;
@@ -35,7 +35,22 @@ pub(super) fn write<W: Write + Seek>(
             dense(kind.name(), values, described, npz)?;
         }
     }
+    if attributes.get(AttributeKind::Material).is_some() {
+        names("material_names", attributes.material_names(), npz)?;
+    }
     Ok(())
+}
+
+/// Texts of at most this many characters; of longer ones the beginning. NumPy gives all the room of the longest.
+const MOST_CHARACTERS: usize = 256;
+
+fn names<W: Write + Seek>(name: &str, names: &[String], npz: &mut NpzWriter<W>) -> io::Result<()> {
+    let width = names.iter().map(|name| name.chars().count().min(MOST_CHARACTERS)).max().unwrap_or(0).max(1);
+    let fill = |index: usize, out: &mut Vec<u8>| {
+        let characters = names[index].chars().take(width).map(u32::from).chain(std::iter::repeat(0));
+        out.extend(characters.take(width).flat_map(u32::to_le_bytes));
+    };
+    npz.array(name, &format!("<U{width}"), &[names.len() as u64], names.len(), &fill, &mut |_| {})
 }
 
 /// The shape of an array whose last axis is the attribute's own, if it has more than one number.

@@ -57,7 +57,7 @@ impl<W: Write + Seek> NpzWriter<W> {
         Self { out, position: 0, entries: Vec::new() }
     }
 
-    /// Adds the array `name` of NumPy type `dtype` (as in `descr`: `|b1`, `<i4`, `<f8`), in C order. `fill` is called
+    /// Adds the array `name` of NumPy type `dtype` (as in `descr`: `|b1`, `<i4`, `<f8`, `<U16`), in C order. `fill` is called
     /// once for each of the `chunks` in any order, on several threads, and appends that chunk's bytes; the chunks in
     /// order must make up the array. `progress` gets the number of chunks that are written.
     ///
@@ -74,6 +74,8 @@ impl<W: Write + Seek> NpzWriter<W> {
     ) -> io::Result<()> {
         let header = npy_header(dtype, shape);
         let item: u64 = dtype.trim_start_matches(|c: char| !c.is_ascii_digit()).parse().unwrap_or(0);
+        // The characters of a text take four bytes each.
+        let item = if dtype.contains('U') { 4 * item } else { item };
         let bytes =
             shape.iter().fold(item, |product, &n| product.saturating_mul(n)).saturating_add(header.len() as u64);
         let mut entry = Entry {

@@ -388,6 +388,8 @@ pub struct VoxelAttributes {
     voxels: usize,
     /// Whether a voxel without a triangle is one that the alpha test cut out.
     surface: bool,
+    /// Names of the mesh's materials, where these were asked for.
+    material_names: Vec<String>,
 }
 
 impl VoxelAttributes {
@@ -401,6 +403,12 @@ impl VoxelAttributes {
     #[must_use]
     pub fn get(&self, kind: AttributeKind) -> Option<&Values> {
         self.columns.iter().find(|column| column.0 == kind).map(|column| &column.1)
+    }
+
+    /// The names that [`AttributeKind::Material`] numbers; empty when it was not asked for.
+    #[must_use]
+    pub fn material_names(&self) -> &[String] {
+        &self.material_names
     }
 
     /// How triangles combined.
@@ -508,7 +516,11 @@ pub fn compute(
     #[cfg(not(feature = "threads"))]
     let parts: Vec<Part> = (0..work.count()).map(|index| task.run(&work.slab(index))).collect();
     let surface_mode = job.mode() != Mode::Solid;
-    Ok(join(parts, request, rank.count(), surface_mode))
+    let mut attributes = join(parts, request, rank.count(), surface_mode);
+    if attributes.get(AttributeKind::Material).is_some() {
+        attributes.material_names = mesh.materials.iter().map(|material| material.name.clone()).collect();
+    }
+    Ok(attributes)
 }
 
 /// The rows of one slab.
@@ -538,7 +550,8 @@ fn join(parts: Vec<Part>, request: &AttributeRequest, voxels: u64, surface: bool
             }
         }
     }
-    VoxelAttributes { columns, combine: request.combine, offsets, covered, voxels, surface }
+    let (combine, material_names) = (request.combine, vec![]);
+    VoxelAttributes { columns, combine, offsets, covered, voxels, surface, material_names }
 }
 
 /// What every slab needs to know.
