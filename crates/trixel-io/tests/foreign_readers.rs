@@ -11,7 +11,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use common::{ANISOTROPIC, CUBIC, ORIGIN, samples};
-use trixel::{Grid, UpAxis, Volume};
+use trixel::attributes::{AttributeKind, AttributeRequest, Combine, Described, compute};
+use trixel::lattice::LatticeMesh;
+use trixel::{Attribute, Grid, Job, Material, Mesh, Mode, Rank, UpAxis, Volume, set_bits};
 use trixel_io::VolumeFormat;
 use trixel_io::volume_read::{read_grid, read_volume};
 use trixel_io::write::{WriteOptions, write_volume};
@@ -102,6 +104,63 @@ fn others_read_what_is_written() {
         write_volume(&folder.join("points.ply"), volume, &sparse).unwrap().commit().unwrap();
     }
     run("check_volumes.py", root.path());
+}
+
+/// A tilted quad of two materials, with texture coordinates and colours at its corners.
+fn two_tone() -> Mesh {
+    let mut mesh =
+        Mesh::new(vec![[0.2, 0.3, 0.4], [8.1, 0.9, 1.3], [7.7, 6.2, 4.4], [0.6, 5.8, 3.1]], vec![[0, 1, 2], [0, 2, 3]]);
+    let color = |r: f32, b: f32| [r, 0.3, b, 1.0];
+    mesh.colors = Some(Attribute::per_vertex(vec![color(0.0, 1.0), color(1.0, 0.0), color(0.5, 0.5), color(0.2, 0.9)]));
+    mesh.uvs = vec![Attribute::per_vertex(vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])];
+    let named = |name: &str| Material { name: name.to_owned(), ..Material::default() };
+    mesh.materials = vec![named("glass"), named("Holz, \u{e4}lter")];
+    mesh.triangle_materials = vec![0, 1];
+    mesh
+}
+
+#[test]
+fn others_read_the_attributes_that_are_written() {
+    let root = tempfile::tempdir().unwrap();
+    let mesh = two_tone();
+    let grid = Grid::new([0.0; 3], [0.5, 0.5, 0.5], [18, 14, 11]).unwrap();
+    let job = Job::new(grid, Mode::Conservative);
+    let volume = trixel::voxelize(&mesh, &job).unwrap();
+    let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
+    let request = AttributeRequest::new(&AttributeKind::ALL, Combine::Mean);
+    let attributes = compute(&mesh, &lattice, &job, &volume, &request).unwrap();
+    let rank = Rank::new(&volume);
+    let described = Described::new(&rank, &attributes).unwrap();
+
+    let write = |name: &str, bytes: Vec<u8>| fs::write(root.path().join(name), bytes).unwrap();
+    let mut layouts = serde_json::Map::new();
+    for (kind, values) in attributes.columns() {
+        let mut rows = Vec::new();
+        (0..values.len()).for_each(|row| values.append_row(row, &mut rows));
+        write(&format!("{}.bin", kind.name()), rows);
+        let (dtype, channels) = values.layout();
+        layouts.insert(kind.name().to_owned(), serde_json::json!([dtype, channels]));
+    }
+    let [nx, ny, _] = grid.dims();
+    let columns = (0..nx).flat_map(|x| (0..ny).map(move |y| [x, y]));
+    let voxels = columns.flat_map(|[x, y]| set_bits(volume.column(x, y)).map(move |z| [x, y, z]));
+    write("indices.bin", voxels.flat_map(|voxel| voxel.map(u32::to_le_bytes).concat()).collect());
+    let names: Vec<_> = mesh.materials.iter().map(|material| &material.name).collect();
+    let expected = serde_json::json!({ "dims": grid.dims(), "attributes": layouts, "material_names": names });
+    write("expected.json", expected.to_string().into_bytes());
+
+    for (name, sparse) in [
+        ("volume.npz", false),
+        ("sparse.npz", true),
+        ("volume.vti", false),
+        ("points.ply", true),
+        ("volume.ply", false),
+        ("volume.glb", false),
+    ] {
+        let options = WriteOptions { up: UpAxis::Z, sparse, described: Some(described), progress: None };
+        write_volume(&root.path().join(name), &volume, &options).unwrap().commit().unwrap();
+    }
+    run("check_attributes.py", root.path());
 }
 
 #[test]
