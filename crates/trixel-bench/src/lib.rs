@@ -1,44 +1,19 @@
-//! What benchmarks run on: built-in scenes, and real meshes where they are present.
+//! Measuring trixel as the papers measured themselves: \[HCV\] table 4.1 and its figures, on any adapter and on the CPU, with
+//! the wrong voxels counted beside every time.
+//!
+//! [`measure`] fills [`Results`]; [`text`] and [`html`] show them, [`compare`] sets them beside older ones, and [`published`]
+//! holds the papers' own numbers. Results are plain data for `serde`.
 
-use std::path::{Path, PathBuf};
+mod cpu_name;
+mod plot;
+mod subjects;
 
-use trixel::Mesh;
-use trixel_io::read::{ReadOptions, read_mesh};
+pub mod compare;
+pub mod html;
+pub mod measure;
+pub mod published;
+pub mod results;
+pub mod text;
 
-/// Built-in scenes that stand for the kinds of mesh there are.
-pub const SCENES: [&str; 6] = [
-    "scene:torus:512",
-    "scene:sphere:256",
-    "scene:triangle",
-    "scene:room:64",
-    "scene:room-rotated:64",
-    "scene:city:24",
-];
-
-/// Real meshes, relative to the folder of meshes, which may be absent.
-pub const MODELS: [&str; 3] =
-    ["bunny/bunny_69666_watertight.off", "stanford-dragon/dragon_vrip.ply", "sponza/Sponza.gltf"];
-
-/// The folder of real meshes: `TRIXEL_MODELS`, or `shared/models` beside the workspace.
-#[must_use]
-pub fn models_folder() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/models");
-    let folder = std::env::var_os("TRIXEL_MODELS").map_or_else(beside, PathBuf::from);
-    folder.is_dir().then_some(folder)
-}
-
-/// The names of all meshes that are there.
-#[must_use]
-pub fn inputs() -> Vec<&'static str> {
-    let present = |name: &&&str| models_folder().is_some_and(|folder| folder.join(name).is_file());
-    SCENES.iter().chain(MODELS.iter().filter(present)).copied().collect()
-}
-
-/// A mesh by a name from [`inputs`]; `None` if it cannot be read.
-#[must_use]
-pub fn load(name: &str) -> Option<Mesh> {
-    match name.strip_prefix("scene:") {
-        Some(spec) => trixel::scene::build(spec).ok(),
-        None => read_mesh(&models_folder()?.join(name), &ReadOptions { attributes: false }).ok().map(|l| l.mesh),
-    }
-}
+pub use results::{Adapter, Cell, Machine, Results, Sweep};
+pub use subjects::{MODELS, SCENES, inputs, load, models_folder};

@@ -42,6 +42,12 @@ pub(crate) enum Command {
     /// Searches by golden section on the mesh and grid given, prints what it measured beside the two pure strategies, and
     /// keeps the best cutoff in the user's configuration folder.
     Tune(TuneArgs),
+    /// Measure every strategy on this machine, with the wrong voxels counted: the papers' tables and plots.
+    ///
+    /// Prints a table in the manner of Rauwendaal's table 4.1, and his own numbers with `--table hcv`. Software adapters are
+    /// labelled as such.
+    #[command(after_help = BENCH_EXAMPLES)]
+    Bench(BenchArgs),
     /// Print a completion script for a shell.
     ///
     /// For example: trixel completions bash > ~/.local/share/bash-completion/completions/trixel
@@ -431,6 +437,110 @@ pub(crate) struct TuneArgs {
     /// Print the curve, but store nothing.
     #[arg(long)]
     pub(crate) dry_run: bool,
+}
+
+const BENCH_EXAMPLES: &str = "\
+Examples:
+  trixel bench --table hcv --html report.html --json results.json
+  trixel bench bunny.ply scene:room -r 256 --counters
+  trixel bench --figure 3.13 --figure 3.14 scene:room --html sweep.html
+  trixel bench --compare results.json";
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchArgs {
+    /// Mesh files and scenes; by default the built-in scenes that stand for the kinds of mesh there are.
+    #[arg(value_name = "INPUT")]
+    pub(crate) inputs: Vec<String>,
+
+    /// The papers' models: a folder with `models.json`, an object of a name for each file, such as
+    /// {"Stanford Bunny": "bunny.ply"}.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) models: Option<PathBuf>,
+
+    /// Print this table of a paper below ours, as it was published; and measure in its mode unless --mode says otherwise.
+    #[arg(long, value_enum, value_name = "NAME")]
+    pub(crate) table: Option<TableArg>,
+
+    /// Measure what this figure of Rauwendaal 2012 needs; 3.13 and 3.14 sweep the hybrid's cutoff. --html shows it.
+    #[arg(long = "figure", value_enum, value_name = "NUMBER")]
+    pub(crate) figures: Vec<FigureArg>,
+
+    /// Voxels along the longest side of the grid.
+    #[arg(short, long = "resolution", value_delimiter = ',', value_name = "N,...", default_value = "128,256,512",
+        value_parser = clap::value_parser!(u32).range(1..=16384))]
+    pub(crate) resolutions: Vec<u32>,
+
+    /// Which voxels are set.
+    #[arg(short, long, value_enum)]
+    pub(crate) mode: Option<ModeArg>,
+
+    /// Strategies of the GPU to measure; by default all of them.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
+    pub(crate) strategy: Vec<StrategyArg>,
+
+    /// Measure the processor, the GPU, or (auto) both.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) backend: BackendArg,
+
+    /// Measure the adapter whose name or driver contains NAME; by default the first, real ones before software.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) adapter: Option<String>,
+
+    /// From which projected area on, in square voxels, the hybrids call a triangle large; by default the best found for each
+    /// mesh and resolution.
+    #[arg(long, value_name = "AREA")]
+    pub(crate) cutoff: Option<f32>,
+
+    /// Let the shaders count, in a run that is not timed.
+    #[arg(long)]
+    pub(crate) counters: bool,
+
+    /// Timed runs of each cell; all strategies take turns.
+    #[arg(long, value_name = "N", default_value = "5")]
+    pub(crate) repeat: NonZeroU32,
+
+    /// Use N threads on the CPU [default: all].
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) threads: Option<u32>,
+
+    /// Write everything that was measured.
+    #[arg(long, value_name = "FILE.json", help_heading = "Output")]
+    pub(crate) json: Option<PathBuf>,
+
+    /// Write a page with tables and plots that needs no other file.
+    #[arg(long, value_name = "FILE.html", help_heading = "Output")]
+    pub(crate) html: Option<PathBuf>,
+
+    /// Say what got faster or slower since FILE.json was written.
+    #[arg(long, value_name = "FILE.json", help_heading = "Output")]
+    pub(crate) compare: Option<PathBuf>,
+}
+
+/// A table of a paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TableArg {
+    /// Rauwendaal 2012, table 4.1.
+    Hcv,
+}
+
+/// A figure of Rauwendaal 2012.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FigureArg {
+    /// Triangle-parallel over the resolution.
+    #[value(name = "3.3")]
+    TriangleParallel,
+    /// Fragment-parallel over the resolution.
+    #[value(name = "3.4")]
+    FragmentParallel,
+    /// Both beside each other.
+    #[value(name = "3.10")]
+    Both,
+    /// The hybrid over its cutoff.
+    #[value(name = "3.13")]
+    Cutoffs,
+    /// The hybrid over low cutoffs.
+    #[value(name = "3.14")]
+    LowCutoffs,
 }
 
 #[derive(Debug, Args)]

@@ -2,6 +2,7 @@
 
 mod args;
 mod attributes;
+mod bench;
 mod engine;
 mod grid;
 mod info;
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Tune(args) => tune::run(args),
+        Command::Bench(args) => bench::run(&args),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "trixel", &mut std::io::stdout());
             Ok(ExitCode::SUCCESS)

@@ -12,7 +12,7 @@ use crate::progress::Reporter;
 /// Reads a mesh file or builds a scene.
 pub(crate) fn load(input: &str, attributes: bool, reporter: &Reporter) -> Result<Mesh> {
     if let Some(spec) = input.strip_prefix("scene:") {
-        return scene::build(spec).map_err(|error| anyhow!("{input}: {error}"));
+        return Ok(scene::build(spec)?);
     }
     let loaded = read_mesh(Path::new(input), &ReadOptions { attributes })?;
     loaded.warnings.iter().for_each(|warning| reporter.warn(format!("{input}: {warning}")));
@@ -43,7 +43,7 @@ pub(crate) fn load_all(inputs: &[String], attributes: bool, reporter: &Reporter)
 }
 
 /// The name of an input among several.
-fn stem(input: &str) -> String {
+pub(crate) fn stem(input: &str) -> String {
     match input.strip_prefix("scene:") {
         Some(scene) => scene.split(':').next().unwrap_or(scene).to_owned(),
         None => {

@@ -58,6 +58,11 @@ impl Reporter {
         (result, elapsed.as_secs_f64() * 1e3)
     }
 
+    /// Shows what the running stage is at.
+    pub(crate) fn now(&self, what: &str) {
+        self.bar.set_message(what.to_owned());
+    }
+
     /// Shows how far the running stage is, from 0 to 1.
     pub(crate) fn fraction(&self, done: f32) {
         show_fraction(&self.bar, done);

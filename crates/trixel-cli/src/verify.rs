@@ -16,7 +16,7 @@ use crate::{memory, mesh};
 
 pub(crate) fn run(args: &VerifyArgs) -> Result<ExitCode> {
     check_method(&args.method);
-    set_threads(&args.method)?;
+    set_threads(args.method.threads)?;
     let reporter = Reporter::new(false);
     let (loaded, _) = reporter.stage("reading the volume", || read_volume(&args.volume, memory::available()));
     let loaded = loaded?;

@@ -38,7 +38,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
         // Dropped at once, which removes it: a report that cannot be written is known before the work.
         AtomicFile::create(report).map(drop).map_err(|error| volume::cannot_write(report, &error))?;
     }
-    set_threads(&args.method)?;
+    set_threads(args.method.threads)?;
     if let Some(target) = out_of_core::target(&args) {
         return out_of_core::run(&args, &target, &request, start);
     }
@@ -217,8 +217,8 @@ fn check_paths(inputs: &[String], outputs: &[PathBuf], report: Option<&Path>) ->
 }
 
 /// Gives rayon the number of threads that was asked for.
-pub(crate) fn set_threads(method: &MethodArgs) -> Result<()> {
-    if let Some(threads) = method.threads {
+pub(crate) fn set_threads(threads: Option<u32>) -> Result<()> {
+    if let Some(threads) = threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
         pool.build_global()
             .map_err(|error| anyhow::anyhow!("cannot start {threads} threads: {error}; ask for fewer"))?;

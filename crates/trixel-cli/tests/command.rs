@@ -545,3 +545,31 @@ fn out_of_core_says_what_is_wrong() {
     bench.ok("voxelize scene:cube -r 20 -o a.zarr --memory-limit 1GiB");
     bench.fails(1, "voxelize scene:cube -r 20 -o a.zarr", &["a.zarr exists already"]);
 }
+
+#[test]
+fn bench_measures_every_strategy_and_counts_wrong_voxels() {
+    let bench = Bench::new();
+    let arguments = "bench scene:room:8 scene:triangle -r 12,20 --adapter llvmpipe --repeat 2 --cutoff 9";
+    let ran = bench.ok(&format!("{arguments} --table hcv --figure 3.14 --counters --json r.json --html r.html"));
+    for said in ["SOFTWARE adapter", "llvmpipe", "mode thin", "GeForce GTX 480", "hybrid-two-pass", "discarded"] {
+        assert!(ran.stdout.contains(said), "no {said} in {}", ran.stdout);
+    }
+    let results: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("r.json")).unwrap()).unwrap();
+    let cells = results["cells"].as_array().unwrap();
+    // The CPU's strategy and five of the GPU's, on two meshes at two resolutions.
+    assert_eq!(cells.len(), 6 * 2 * 2);
+    assert!(cells.iter().all(|cell| cell["wrong_voxels"] == 0 && cell["voxels"].as_u64() > Some(0)));
+    assert!(cells.iter().all(|cell| cell["min_ms"].as_f64() <= cell["median_ms"].as_f64()));
+    assert_eq!(results["sweeps"].as_array().unwrap().len(), 2);
+    let page = std::fs::read_to_string(bench.path("r.html")).unwrap();
+    assert!(page.matches("<svg").count() >= 7, "{}", page.matches("<svg").count());
+    assert!(!page.contains("http://") || page.matches("http://").count() == page.matches("http://www.w3.org").count());
+
+    let compared = bench.ok(&format!("{arguments} --mode thin --compare r.json"));
+    assert!(compared.stdout.contains("room at 20, gpu hybrid: "), "{}", compared.stdout);
+    bench.ok("bench scene:cube -r 8 --backend cpu --repeat 1");
+    bench.fails(1, "bench scene:cube -r 8 --compare r.html", &["r.html", "bench --json"]);
+    bench.fails(1, "bench --models nowhere", &["models.json", "Stanford Bunny"]);
+    bench.fails(2, "bench scene:cube scene:cube", &["two inputs are called cube"]);
+    bench.fails(2, "bench --strategy column-runs", &["column-runs", "--backend cpu"]);
+}

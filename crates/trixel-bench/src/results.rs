@@ -1,0 +1,185 @@
+//! What was measured, as it is stored.
+
+use serde::{Deserialize, Serialize};
+
+/// The version of the stored form; a change that old readers would misread raises it.
+pub const SCHEMA: u32 = 1;
+
+/// Everything that one run of the benchmark measured.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Results {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// The version of trixel.
+    pub trixel: String,
+    /// When, in seconds since 1970.
+    pub unix_time: u64,
+    /// On what.
+    pub machine: Machine,
+    /// The GPU adapter, if there was one.
+    pub adapter: Option<Adapter>,
+    /// The mode of all cells.
+    pub mode: String,
+    /// One for each mesh, resolution and strategy.
+    pub cells: Vec<Cell>,
+    /// Times over the hybrid's cutoff.
+    pub sweeps: Vec<Sweep>,
+}
+
+/// The machine.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Machine {
+    /// The processor's name.
+    pub cpu: String,
+    /// Threads that the CPU backend used.
+    pub threads: usize,
+    /// The operating system.
+    pub system: String,
+}
+
+/// A GPU adapter.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Adapter {
+    /// Its name.
+    pub name: String,
+    /// Its driver and version.
+    pub driver: String,
+    /// Whether it is a program on the CPU.
+    pub software: bool,
+    /// The tier of shaders.
+    pub tier: String,
+}
+
+/// One mesh, resolution and strategy.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Cell {
+    /// The mesh.
+    pub mesh: String,
+    /// Its triangles.
+    pub triangles: u64,
+    /// Voxels along the grid's longest side.
+    pub resolution: u32,
+    /// `cpu` or `gpu`.
+    pub backend: String,
+    /// The strategy.
+    pub strategy: String,
+    /// Of the hybrids: from which projected area on, in square voxels, a triangle is large.
+    pub cutoff: Option<f32>,
+    /// Runs that were timed.
+    pub runs: usize,
+    /// The median time, in milliseconds, without upload and download.
+    pub median_ms: f64,
+    /// The shortest.
+    pub min_ms: f64,
+    /// The longest.
+    pub max_ms: f64,
+    /// Time of each pass on the device in the last run, where the adapter has timestamps.
+    pub passes_ms: Vec<(String, f64)>,
+    /// What the shaders counted, if that was asked for.
+    pub counters: Option<Counters>,
+    /// Set voxels.
+    pub voxels: u64,
+    /// Voxels that differ from the CPU's.
+    pub wrong_voxels: u64,
+}
+
+/// [`trixel_gpu::Counters`], as stored.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Counters {
+    /// Compute invocations that had something to look at.
+    pub invocations: u64,
+    /// Fragments shaded.
+    pub fragments: u64,
+    /// Fragments that set no voxel.
+    pub fragments_discarded: u64,
+    /// Columns of triangles tested.
+    pub columns: u64,
+    /// Voxels tested.
+    pub voxel_tests: u64,
+    /// Voxels written.
+    pub voxels_written: u64,
+    /// Atomic operations.
+    pub atomics: u64,
+}
+
+impl From<trixel_gpu::Counters> for Counters {
+    fn from(counted: trixel_gpu::Counters) -> Self {
+        Self {
+            invocations: counted.invocations,
+            fragments: counted.fragments,
+            fragments_discarded: counted.fragments_discarded,
+            columns: counted.columns,
+            voxel_tests: counted.voxel_tests,
+            voxels_written: counted.voxels_written,
+            atomics: counted.atomics,
+        }
+    }
+}
+
+/// The hybrid's time over its cutoff.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Sweep {
+    /// The mesh.
+    pub mesh: String,
+    /// Voxels along the grid's longest side.
+    pub resolution: u32,
+    /// Cutoff in square voxels of projected area, and the median time in milliseconds.
+    pub samples: Vec<(f32, f64)>,
+}
+
+impl Results {
+    /// The meshes, in the order in which they were measured.
+    #[must_use]
+    pub fn meshes(&self) -> Vec<&str> {
+        in_order(self.cells.iter().map(|cell| cell.mesh.as_str()))
+    }
+
+    /// The columns of the table: backends with their strategies.
+    #[must_use]
+    pub fn columns(&self) -> Vec<(&str, &str)> {
+        in_order(self.cells.iter().map(|cell| (cell.backend.as_str(), cell.strategy.as_str())))
+    }
+
+    /// The resolutions of a mesh.
+    #[must_use]
+    pub fn resolutions(&self, mesh: &str) -> Vec<u32> {
+        in_order(self.cells.iter().filter(|cell| cell.mesh == mesh).map(|cell| cell.resolution))
+    }
+
+    /// One cell.
+    #[must_use]
+    pub fn cell(&self, mesh: &str, resolution: u32, (backend, strategy): (&str, &str)) -> Option<&Cell> {
+        self.cells.iter().find(|cell| {
+            cell.mesh == mesh && cell.resolution == resolution && cell.backend == backend && cell.strategy == strategy
+        })
+    }
+
+    /// Voxels that differ from the CPU's, over all cells.
+    #[must_use]
+    pub fn wrong_voxels(&self) -> u64 {
+        self.cells.iter().map(|cell| cell.wrong_voxels).sum()
+    }
+
+    /// The adapter in words, and that it is no GPU where it is none.
+    #[must_use]
+    pub fn adapter_line(&self) -> String {
+        match &self.adapter {
+            None => "no GPU adapter".to_owned(),
+            Some(Adapter { name, driver, software, tier }) => {
+                let kind = if *software { "SOFTWARE adapter: its times say nothing of GPUs; " } else { "" };
+                format!("{kind}{name} ({driver}; tier {tier})")
+            }
+        }
+    }
+}
+
+/// Each value once, where it came first.
+fn in_order<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
+    let mut seen = vec![];
+    for value in values {
+        if !seen.contains(&value) {
+            seen.push(value);
+        }
+    }
+    seen
+}
