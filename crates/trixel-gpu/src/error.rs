@@ -1,5 +1,7 @@
 //! What can go wrong on a GPU.
 
+use crate::lists::ListMethod;
+
 /// Why a GPU did not voxelize.
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -42,6 +44,31 @@ pub enum GpuError {
         adapter: String,
         /// What was wrong in the start-up check.
         reason: String,
+    },
+    /// Something that a shader must see whole is larger than what the adapter binds.
+    #[error(
+        "{adapter}: {what} need {} in one piece, and the adapter binds {} at most; choose a lower resolution, or use the CPU",
+        trixel::Bytes(*needed), trixel::Bytes(*limit)
+    )]
+    BindingTooSmall {
+        /// The adapter.
+        adapter: String,
+        /// What does not fit.
+        what: &'static str,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes that the adapter binds.
+        limit: u64,
+    },
+    /// A way to make lists that does not suit.
+    #[error("{method} makes no list {of}; use {instead}")]
+    ListMethod {
+        /// The method.
+        method: ListMethod,
+        /// Of what it makes none.
+        of: &'static str,
+        /// What does.
+        instead: &'static str,
     },
     /// Memory ran out.
     #[error("{adapter}: out of GPU memory; choose a lower resolution, or use the CPU backend")]

@@ -9,6 +9,7 @@ use crate::tier::Tier;
 macro_rules! shader {
     ($($file:literal)*) => { &[$(include_str!(concat!("shaders/", $file, ".wgsl"))),*] };
 }
+pub(crate) use shader;
 
 /// A step of a voxelization that has its own compute pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -89,11 +90,46 @@ impl Raster {
 pub(crate) struct Variant {
     pub(crate) mode: Mode,
     pub(crate) counting: bool,
+    pub(crate) sink: Sink,
+}
+
+/// Where voxels go: `SINK` of `voxels.wgsl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(crate) enum Sink {
+    #[default]
+    Bits,
+    /// To the bits, and to a list by whoever sets one.
+    List,
+    /// To a list alone, once for every triangle; with the triangle's number if `owned`.
+    Fragments { owned: bool },
+}
+
+impl Sink {
+    fn code(self) -> u32 {
+        match self {
+            Self::Bits => 0,
+            Self::List => 1,
+            Self::Fragments { .. } => 2,
+        }
+    }
+
+    /// Whether a stage needs the list bound.
+    pub(crate) fn appends(self, stage: Stage) -> bool {
+        let writes = matches!(
+            stage,
+            Stage::TriangleParallel { .. } | Stage::TriangleList { .. } | Stage::Balanced | Stage::Fill
+        );
+        self != Self::Bits && writes
+    }
+
+    fn files(self) -> &'static [&'static str] {
+        if self == Self::Bits { shader!("entry" "no_append") } else { shader!("entry" "append") }
+    }
 }
 
 impl Variant {
     /// Of stages that are the same in every mode.
-    pub(crate) const ANY: Self = Self { mode: Mode::Conservative, counting: false };
+    pub(crate) const ANY: Self = Self { mode: Mode::Conservative, counting: false, sink: Sink::Bits };
 }
 
 /// The WGSL of a compute stage.
@@ -112,7 +148,8 @@ pub(crate) fn source(stage: Stage, variant: Variant, tier: Tier, max_groups: u32
         }
         _ => {}
     }
-    assemble(variant, tier, &constants, stage.files())
+    let writes = matches!(stage, Stage::Fill) || stage.files().contains(&include_str!("shaders/voxels.wgsl"));
+    assemble(variant, tier, &constants, stage.files(), writes)
 }
 
 /// The WGSL of a vertex and a fragment stage.
@@ -120,10 +157,11 @@ pub(crate) fn raster_source(raster: Raster, variant: Variant, tier: Tier) -> Str
     let (listed, dilation) = (raster.listed, raster.dilation.code());
     let constants =
         format!("const SMALL: bool = false;\nconst LISTED: bool = {listed};\nconst DILATION: u32 = {dilation}u;\n");
-    assemble(variant, tier, &constants, Raster::FILES)
+    assemble(variant, tier, &constants, Raster::FILES, true)
 }
 
-fn assemble(variant: Variant, tier: Tier, constants: &str, files: &[&str]) -> String {
+/// `writes` says whether voxels are written, and so may be appended to a list.
+fn assemble(variant: Variant, tier: Tier, constants: &str, files: &[&str], writes: bool) -> String {
     let mode = match variant.mode {
         Mode::Conservative => 0,
         Mode::Thin => 1,
@@ -138,18 +176,28 @@ fn assemble(variant: Variant, tier: Tier, constants: &str, files: &[&str]) -> St
         Tier::Portable => include_str!("shaders/product_portable.wgsl"),
         Tier::Int64 => include_str!("shaders/product_int64.wgsl"),
     };
-    [&[shared.as_str(), constants, product], files].concat().join("\n")
+    let sink = variant.sink;
+    let (code, owned) = (sink.code(), sink == Sink::Fragments { owned: true });
+    let listing = sink == Sink::List;
+    let sinks = format!("const SINK: u32 = {code}u;\nconst OWNED: bool = {owned};\nconst LISTING: bool = {listing};\n");
+    let constants: &[&str] = &[shared.as_str(), sinks.as_str(), constants, product];
+    [constants, files, if writes { sink.files() } else { &[] }].concat().join("\n")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::Kernel;
 
-    const VARIANTS: [Variant; 8] = {
-        let mut variants = [Variant::ANY; 8];
+    const SINKS: [Sink; 4] =
+        [Sink::Bits, Sink::List, Sink::Fragments { owned: false }, Sink::Fragments { owned: true }];
+
+    /// Every mode with every sink, half of them counting.
+    const VARIANTS: [Variant; 16] = {
+        let mut variants = [Variant::ANY; 16];
         let mut i = 0;
         while i < variants.len() {
-            variants[i] = Variant { mode: Mode::ALL[i / 2], counting: i % 2 == 1 };
+            variants[i] = Variant { mode: Mode::ALL[i / 4], counting: (i / 4 + i) % 2 == 1, sink: SINKS[i % 4] };
             i += 1;
         }
         variants
@@ -195,6 +243,13 @@ mod tests {
                     assert_valid(&source(stage, variant, tier, 65_535), tier, &[stage.entry_point()]);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn every_kernel_is_valid() {
+        for kernel in Kernel::all() {
+            assert_valid(&kernel.source(), &[kernel.entry_point()]);
         }
     }
 
