@@ -70,6 +70,14 @@ pub enum GpuError {
         /// What does.
         instead: &'static str,
     },
+    /// A list in an order that a structure cannot be built from.
+    #[error(
+        "octrees and brick maps are built from lists along the Morton curve; make the list with `VoxelOrder::Morton`"
+    )]
+    ListOrder,
+    /// The nodes that came back are not an octree's.
+    #[error(transparent)]
+    Octree(#[from] trixel::octree::OctreeError),
     /// Memory ran out.
     #[error("{adapter}: out of GPU memory; choose a lower resolution, or use the CPU backend")]
     OutOfMemory {

@@ -26,6 +26,13 @@ pub(crate) enum Kernel {
     MoveEntries(VoxelOrder),
     CountDistinct,
     WriteDistinct,
+    MarkCubes,
+    /// Of single voxels, or of the cubes of a level.
+    GatherOctants {
+        voxels: bool,
+    },
+    WriteNodes,
+    WriteBricks,
 }
 
 impl Kernel {
@@ -44,6 +51,11 @@ impl Kernel {
             Self::Traverse,
             Self::CountDistinct,
             Self::WriteDistinct,
+            Self::MarkCubes,
+            Self::GatherOctants { voxels: true },
+            Self::GatherOctants { voxels: false },
+            Self::WriteNodes,
+            Self::WriteBricks,
         ];
         others.into_iter().chain(sorting).collect()
     }
@@ -61,6 +73,10 @@ impl Kernel {
             Self::MoveEntries(_) => "move_entries",
             Self::CountDistinct => "count_distinct",
             Self::WriteDistinct => "write_distinct",
+            Self::MarkCubes => "mark_cubes",
+            Self::GatherOctants { .. } => "gather_octants",
+            Self::WriteNodes => "write_nodes",
+            Self::WriteBricks => "write_bricks",
         }
     }
 
@@ -71,6 +87,15 @@ impl Kernel {
             Self::SumWords | Self::SumCells | Self::Traverse => shader!("numbering" "entry" "slab" "histopyramid"),
             Self::CountDigits(_) | Self::MoveEntries(_) => shader!("numbering" "entry" "sort_key" "radix_sort"),
             Self::CountDistinct | Self::WriteDistinct => shader!("numbering" "merge"),
+            Self::MarkCubes => shader!("numbering" "entry" "sparse"),
+            Self::GatherOctants { voxels: true } => {
+                shader!("numbering" "entry" "sparse" "octree_on_voxels" "octree")
+            }
+            Self::GatherOctants { voxels: false } => {
+                shader!("numbering" "entry" "sparse" "octree_on_cubes" "octree")
+            }
+            Self::WriteNodes => shader!("numbering" "octree_nodes"),
+            Self::WriteBricks => shader!("numbering" "entry" "sparse" "bricks"),
         }
     }
 

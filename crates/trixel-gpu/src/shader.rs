@@ -100,8 +100,8 @@ pub(crate) enum Sink {
     Bits,
     /// To the bits, and to a list by whoever sets one.
     List,
-    /// To a list alone, once for every triangle; with the triangle's number if `owned`.
-    Fragments { owned: bool },
+    /// To a list alone, once for every triangle.
+    Fragments,
 }
 
 impl Sink {
@@ -109,7 +109,7 @@ impl Sink {
         match self {
             Self::Bits => 0,
             Self::List => 1,
-            Self::Fragments { .. } => 2,
+            Self::Fragments => 2,
         }
     }
 
@@ -177,9 +177,8 @@ fn assemble(variant: Variant, tier: Tier, constants: &str, files: &[&str], write
         Tier::Int64 => include_str!("shaders/product_int64.wgsl"),
     };
     let sink = variant.sink;
-    let (code, owned) = (sink.code(), sink == Sink::Fragments { owned: true });
-    let listing = sink == Sink::List;
-    let sinks = format!("const SINK: u32 = {code}u;\nconst OWNED: bool = {owned};\nconst LISTING: bool = {listing};\n");
+    let (code, listing) = (sink.code(), sink == Sink::List);
+    let sinks = format!("const SINK: u32 = {code}u;\nconst LISTING: bool = {listing};\n");
     let constants: &[&str] = &[shared.as_str(), sinks.as_str(), constants, product];
     [constants, files, if writes { sink.files() } else { &[] }].concat().join("\n")
 }
@@ -189,8 +188,7 @@ mod tests {
     use super::*;
     use crate::kernel::Kernel;
 
-    const SINKS: [Sink; 4] =
-        [Sink::Bits, Sink::List, Sink::Fragments { owned: false }, Sink::Fragments { owned: true }];
+    const SINKS: [Sink; 4] = [Sink::Bits, Sink::List, Sink::Fragments, Sink::Bits];
 
     /// Every mode with every sink, half of them counting.
     const VARIANTS: [Variant; 16] = {

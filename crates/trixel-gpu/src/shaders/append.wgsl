@@ -1,7 +1,4 @@
-// Voxels appended to a list while voxelizing: [HCV] 3.4. OWNED is prepended: whether entries name their triangle.
-
-// The triangle at hand, counted over all chunks of the mesh.
-var<private> owner: u32;
+// Voxels appended to a list while voxelizing: [HCV] 3.4.
 
 struct Appended {
     count: atomic<u32>,
@@ -10,12 +7,10 @@ struct Appended {
     // Not 0 when the count has passed 2^32.
     wrapped: atomic<u32>,
     unused: u32,
-    entries: array<u32>,
+    entries: array<vec2<u32>>,
 }
 
 @group(2) @binding(0) var<storage, read_write> appended: Appended;
-
-const ENTRY_WORDS: u32 = select(2u, 3u, OWNED);
 
 // Appends the voxels of a column that a word's bits name, from z on.
 fn append(column: vec2<u32>, z: u32, bits: u32) {
@@ -27,11 +22,7 @@ fn append(column: vec2<u32>, z: u32, bits: u32) {
     for (var rest = bits; rest != 0u; rest &= rest - 1u) {
         if place < appended.capacity {
             let entry = entry_of(vec3<u32>(column, z + firstTrailingBit(rest)));
-            appended.entries[ENTRY_WORDS * place] = entry.x;
-            appended.entries[ENTRY_WORDS * place + 1u] = entry.y;
-            if OWNED {
-                appended.entries[ENTRY_WORDS * place + 2u] = owner;
-            }
+            appended.entries[place] = entry;
         }
         place++;
     }

@@ -37,7 +37,6 @@ fn balanced(
         }
         let triangle = triangle_of_pair(pair);
         column = pair - before[triangle];
-        owner = params.first_triangle + triangle;
         if column == 0u || local == 0u {
             ready[local] = triangle_of(shape_of(corners(triangle)));
         }

@@ -16,7 +16,7 @@ const MARGIN: f32 = 0.125;
 // A vertex that would move further, in pixels, is one of a needle, whose bounding rectangle serves better.
 const MAX_SHIFT: f32 = 64.0;
 
-// A Triangle and its number as flat varyings.
+// A Triangle as flat varyings.
 struct Varyings {
     @builtin(position) position: vec4<f32>,
     @location(0) @interpolate(flat) ea_flags: vec4<i32>,
@@ -31,7 +31,7 @@ struct Varyings {
     @location(9) @interpolate(flat) plane: vec4<u32>,
 }
 
-fn pack(t: Triangle, triangle: u32) -> Varyings {
+fn pack(t: Triangle) -> Varyings {
     var v: Varyings;
     v.ea_flags = vec4<i32>(t.ea, i32(t.flags));
     v.eb_base = vec4<i32>(t.eb, t.base.x);
@@ -41,7 +41,7 @@ fn pack(t: Triangle, triangle: u32) -> Varyings {
     v.ca_extent = vec4<i32>(t.ca_high, t.extent.y);
     v.w0_extent = vec4<i32>(t.w0, t.extent.z);
     v.low_error = vec4<u32>(t.low_0.x, t.low_1.x, t.low_2.x, bitcast<u32>(t.error));
-    v.low = vec4<u32>(t.low_0.y, t.low_1.y, t.low_2.y, triangle);
+    v.low = vec4<u32>(t.low_0.y, t.low_1.y, t.low_2.y, 0u);
     v.plane = bitcast<vec4<u32>>(t.plane);
     return v;
 }
@@ -191,7 +191,7 @@ fn dilate(@builtin(vertex_index) index: u32) -> Varyings {
         return nothing;
     }
     let t = triangle_of(shape);
-    var v = pack(t, triangle);
+    var v = pack(t);
     let pixel = dilated(t, corner) + vec2<f32>(t.base.xy - window_corner(t.flags & AXIS_MASK));
     let unit = pixel / params.window_size;
     v.position = vec4<f32>(2.0 * unit.x - 1.0, 1.0 - 2.0 * unit.y, 0.5, 1.0);
@@ -209,7 +209,6 @@ fn fragment_parallel(v: Varyings) -> @location(0) vec4<f32> {
     let rect = column_rect(t.base, t.extent, t.flags & AXIS_MASK);
     var passed = false;
     if all(column >= rect.xy) && all(column <= rect.zw) {
-        owner = params.first_triangle + v.low.w;
         passed = voxelize_column(t, column.x, column.y);
     }
     if COUNTING {

@@ -18,7 +18,6 @@ fn triangle_list(
     }
     let shape = shape_of(corners(list[i]));
     if (shape.flags & EMPTY) == 0u {
-        owner = params.first_triangle + list[i];
         voxelize_columns(triangle_of(shape), params.first_column);
         flush_counters();
     }

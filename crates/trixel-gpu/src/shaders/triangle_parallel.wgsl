@@ -24,7 +24,6 @@ fn triangle_parallel(
         list[atomicAdd(&listed, 1u)] = i;
         return;
     }
-    owner = params.first_triangle + i;
     voxelize_columns(triangle_of(look.shape), 0u);
     flush_counters();
 }
