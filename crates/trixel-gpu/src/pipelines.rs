@@ -94,7 +94,7 @@ impl Layouts {
             Stage::Arguments { .. } => &self.arguments,
             _ => &self.common,
         };
-        let third = sink.appends(stage).then_some(&self.append);
+        let third = (sink != Sink::Bits && stage.writes_voxels()).then_some(&self.append);
         let groups = if third.is_some() { 3 } else { 1 + usize::from(second.is_some()) };
         [Some(first), second, third].into_iter().take(groups).collect()
     }

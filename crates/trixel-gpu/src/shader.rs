@@ -53,6 +53,19 @@ impl Stage {
         }
     }
 
+    /// Whether voxels are written, and so may be appended to a list.
+    pub(crate) fn writes_voxels(self) -> bool {
+        match self {
+            Self::TriangleParallel { .. } | Self::TriangleList { .. } | Self::Balanced | Self::Fill => true,
+            Self::Classify { .. }
+            | Self::CountColumns
+            | Self::Expand
+            | Self::ScanBlocks
+            | Self::AddTotals
+            | Self::Arguments { .. } => false,
+        }
+    }
+
     fn files(self) -> &'static [&'static str] {
         match self {
             Self::TriangleParallel { .. } => shader!(
@@ -113,15 +126,6 @@ impl Sink {
         }
     }
 
-    /// Whether a stage needs the list bound.
-    pub(crate) fn appends(self, stage: Stage) -> bool {
-        let writes = matches!(
-            stage,
-            Stage::TriangleParallel { .. } | Stage::TriangleList { .. } | Stage::Balanced | Stage::Fill
-        );
-        self != Self::Bits && writes
-    }
-
     fn files(self) -> &'static [&'static str] {
         if self == Self::Bits { shader!("entry" "no_append") } else { shader!("entry" "append") }
     }
@@ -148,8 +152,7 @@ pub(crate) fn source(stage: Stage, variant: Variant, tier: Tier, max_groups: u32
         }
         _ => {}
     }
-    let writes = matches!(stage, Stage::Fill) || stage.files().contains(&include_str!("shaders/voxels.wgsl"));
-    assemble(variant, tier, &constants, stage.files(), writes)
+    assemble(variant, tier, &constants, stage.files(), stage.writes_voxels())
 }
 
 /// The WGSL of a vertex and a fragment stage.
@@ -160,7 +163,7 @@ pub(crate) fn raster_source(raster: Raster, variant: Variant, tier: Tier) -> Str
     assemble(variant, tier, &constants, Raster::FILES, true)
 }
 
-/// `writes` says whether voxels are written, and so may be appended to a list.
+/// `writes` says whether voxels are written.
 fn assemble(variant: Variant, tier: Tier, constants: &str, files: &[&str], writes: bool) -> String {
     let mode = match variant.mode {
         Mode::Conservative => 0,
@@ -247,7 +250,7 @@ mod tests {
     #[test]
     fn every_kernel_is_valid() {
         for kernel in Kernel::all() {
-            assert_valid(&kernel.source(), &[kernel.entry_point()]);
+            assert_valid(&kernel.source(), Tier::Portable, &[kernel.entry_point()]);
         }
     }
 
