@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use trixel::lattice::LatticeMesh;
-use trixel::{Bytes, Grid, Job, Mode, Volume, VoxelOrder};
+use trixel::{Bytes, Grid, Job, Mode, Volume, VoxelOrder, voxel_list};
 use trixel_gpu::{AdapterChoice, Gpu, GpuMesh, ListMethod, Options, Voxelizer};
 use trixel_io::read::{ReadOptions, read_mesh};
 
@@ -32,7 +32,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         for &resolution in &resolutions {
             let grid = Grid::fit(&mesh.bounds().ok_or("an empty mesh")?, resolution)?;
             let on_gpu = GpuMesh::upload(&gpu, &LatticeMesh::snap(&mesh, &grid)?)?;
-            let mut voxelizer = Voxelizer::new(&gpu, &Job::new(grid, Mode::Conservative), &Options::default())?;
+            let job = Job::new(grid, Mode::Conservative);
+            let mut voxelizer = Voxelizer::new(&gpu, &job, &Options::default())?;
+            let expected = voxel_list(&trixel::voxelize(&mesh, &job)?, VoxelOrder::Xyz);
+            let mut wrong = [0; ListMethod::ALL.len()];
             let mut times = [[0.0; RUNS]; ListMethod::ALL.len()];
             let mut sizes = [[0; 2]; ListMethod::ALL.len()];
             // Once before, for the pipelines.
@@ -42,14 +45,27 @@ fn main() -> Result<(), Box<dyn Error>> {
                     let list = voxelizer.list(&on_gpu, method, VoxelOrder::Xyz)?;
                     gpu.wait()?;
                     times[i][run.saturating_sub(1)] = start.elapsed().as_secs_f64() * 1e3;
+                    if run == 0 {
+                        let found = list.download(&gpu)?;
+                        let differ = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
+                        wrong[i] = differ + found.len().abs_diff(expected.len());
+                    }
                     let bits = if method == ListMethod::FragmentList { 0 } else { Volume::required_bytes(&grid) };
                     sizes[i] = [u64::from(list.len()), bits + list.bytes() + list.scratch_bytes()];
                 }
             }
             writeln!(out, "{path}, {} triangles, at {resolution}: {} voxels", on_gpu.triangles(), sizes[0][0])?;
-            for ((method, mut times), [_, bytes]) in ListMethod::ALL.into_iter().zip(times).zip(sizes) {
+            for (((method, mut times), [_, bytes]), wrong) in
+                ListMethod::ALL.into_iter().zip(times).zip(sizes).zip(wrong)
+            {
                 times.sort_by(f64::total_cmp);
-                writeln!(out, "  {method:14} {:8.1} ms  {}", times[RUNS / 2], Bytes(bytes))?;
+                writeln!(
+                    out,
+                    "  {:14} {:8.1} ms  {}, {wrong} wrong entries",
+                    method.name(),
+                    times[RUNS / 2],
+                    Bytes(bytes)
+                )?;
             }
         }
     }

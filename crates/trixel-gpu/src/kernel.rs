@@ -33,6 +33,7 @@ pub(crate) enum Kernel {
     },
     WriteNodes,
     WriteBricks,
+    Answer,
 }
 
 impl Kernel {
@@ -56,6 +57,7 @@ impl Kernel {
             Self::GatherOctants { voxels: false },
             Self::WriteNodes,
             Self::WriteBricks,
+            Self::Answer,
         ];
         others.into_iter().chain(sorting).collect()
     }
@@ -77,6 +79,7 @@ impl Kernel {
             Self::GatherOctants { .. } => "gather_octants",
             Self::WriteNodes => "write_nodes",
             Self::WriteBricks => "write_bricks",
+            Self::Answer => "answer",
         }
     }
 
@@ -96,6 +99,7 @@ impl Kernel {
             }
             Self::WriteNodes => shader!("numbering" "octree_nodes"),
             Self::WriteBricks => shader!("numbering" "entry" "sparse" "bricks"),
+            Self::Answer => shader!("numbering" "entry" "octree_query"),
         }
     }
 

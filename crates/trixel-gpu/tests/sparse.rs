@@ -30,6 +30,15 @@ fn compare(gpu: &Gpu, what: &str, volume: &Volume) {
     let list = GpuVoxelList::of(gpu, &uploaded(gpu, volume), ListMethod::Histopyramid, VoxelOrder::Morton).unwrap();
     let octree = GpuOctree::of(gpu, &list).unwrap();
     assert!(octree.download(gpu).unwrap() == Octree::new(volume, None).unwrap(), "{what}: octree");
+    // Every voxel, and some around the grid and far away.
+    let [nx, ny, nz] = volume.grid().dims().map(|d| d + 2);
+    let all = (0..nx).flat_map(|x| (0..ny).flat_map(move |y| (0..nz).map(move |z| [x, y, z])));
+    let asked: Vec<[u32; 3]> = all.chain([[1 << 16, 0, 0], [0, u32::MAX, 0], [0, 0, 1 << 15]]).collect();
+    let answers = octree.contains(gpu, &asked).unwrap();
+    assert!(
+        answers.iter().eq(asked.iter().map(|voxel| volume.get(*voxel)).collect::<Vec<_>>().iter()),
+        "{what}: asked"
+    );
     let bricks = GpuBrickMap::of(gpu, &list).unwrap().download(gpu).unwrap();
     assert_eq!(bricks.count(), volume.count(), "{what}: bricks");
     assert!(bricks.to_volume(None).unwrap() == *volume, "{what}: bricks");

@@ -21,6 +21,15 @@ pub struct GpuOctree {
     everything: bool,
 }
 
+/// A coordinate outside every grid that fits an entry.
+const BEYOND: u32 = 0xffff;
+
+/// Levels of nodes over a grid: the root's cube is 2^height voxels wide.
+fn height_of(grid: &Grid) -> u32 {
+    let longest = grid.dims().into_iter().max().unwrap_or(1);
+    longest.next_power_of_two().trailing_zeros().max(1)
+}
+
 /// The cubes of one level that hold any voxel.
 struct Level {
     cubes: Entries,
@@ -68,10 +77,8 @@ impl GpuOctree {
         if list.order() != VoxelOrder::Morton {
             return Err(GpuError::ListOrder);
         }
-        let longest = list.grid().dims().into_iter().max().unwrap_or(1);
-        let height = longest.next_power_of_two().trailing_zeros().max(1);
         let mut levels: Vec<Level> = vec![];
-        for _ in 0..height {
+        for _ in 0..height_of(list.grid()) {
             let level = match levels.last() {
                 None => Level::above(gpu, (list.buffer(), list.len()), None)?,
                 Some(below) => Level::above(gpu, (&below.cubes.buffer, below.cubes.length), Some(below))?,
@@ -122,6 +129,28 @@ impl GpuOctree {
     #[must_use]
     pub fn buffer(&self) -> &wgpu::Buffer {
         &self.nodes.buffer
+    }
+
+    /// Which of some voxels are set; voxels outside the grid are not.
+    ///
+    /// # Errors
+    /// When there are more than the adapter binds, memory runs out or the device is lost.
+    pub fn contains(&self, gpu: &Gpu, voxels: &[[u32; 3]]) -> Result<Vec<bool>, GpuError> {
+        let count = u32::try_from(voxels.len()).unwrap_or(u32::MAX);
+        let questions = Entries::new(gpu, count)?;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let answers = gpu.storage("an octree's answers", u64::from(count) * 4, usage)?;
+        // What lies beyond every grid must not lose the bits that tell.
+        let words: Vec<[u32; 2]> =
+            voxels.iter().map(|voxel| voxel.map(|c| c.min(BEYOND))).map(|[x, y, z]| [x | y << 16, z]).collect();
+        gpu.guarded(|| gpu.queue().write_buffer(&questions.buffer, 0, bytemuck::cast_slice(&words)))?;
+        let parameters = [height_of(&self.grid), u32::from(self.everything), self.len(), count];
+        let mut bound = vec![(0, Bound::Words(&parameters))];
+        bound.extend((1..).zip([self.buffer(), &questions.buffer, &answers].map(Bound::Buffer)));
+        let mut asking = Dispatcher::new(gpu);
+        asking.dispatch(Kernel::Answer, &bound, count)?;
+        let read = asking.read_words(&[(&answers, voxels.len())])?;
+        Ok(read.into_iter().flatten().map(|answer| answer != 0).collect())
     }
 
     /// The same octree as the CPU has it.
