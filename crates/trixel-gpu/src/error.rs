@@ -1,5 +1,7 @@
 //! What can go wrong on a GPU.
 
+use crate::lists::ListMethod;
+
 /// Why a GPU did not voxelize.
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -43,6 +45,39 @@ pub enum GpuError {
         /// What was wrong in the start-up check.
         reason: String,
     },
+    /// Something that a shader must see whole is larger than what the adapter binds.
+    #[error(
+        "{adapter}: {what} need {} in one piece, and the adapter binds {} at most; choose a lower resolution, or use the CPU",
+        trixel::Bytes(*needed), trixel::Bytes(*limit)
+    )]
+    BindingTooSmall {
+        /// The adapter.
+        adapter: String,
+        /// What does not fit.
+        what: &'static str,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes that the adapter binds.
+        limit: u64,
+    },
+    /// A way to make lists that does not suit.
+    #[error("{method} makes no list {of}; use {instead}")]
+    ListMethod {
+        /// The method.
+        method: ListMethod,
+        /// Of what it makes none.
+        of: &'static str,
+        /// What does.
+        instead: &'static str,
+    },
+    /// A list in an order that a structure cannot be built from.
+    #[error(
+        "octrees and brick maps are built from lists along the Morton curve; make the list with `VoxelOrder::Morton`"
+    )]
+    ListOrder,
+    /// The nodes that came back are not an octree's.
+    #[error(transparent)]
+    Octree(#[from] trixel::octree::OctreeError),
     /// Memory ran out.
     #[error("{adapter}: out of GPU memory; choose a lower resolution, or use the CPU backend")]
     OutOfMemory {

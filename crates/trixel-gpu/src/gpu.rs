@@ -201,6 +201,21 @@ impl Gpu {
         })
     }
 
+    /// A buffer that a shader sees whole, or an error that says what does not fit one.
+    pub(crate) fn storage(
+        &self,
+        label: &'static str,
+        bytes: u64,
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer, GpuError> {
+        let limit = self.limits().binding_bytes;
+        if bytes > limit {
+            let (adapter, what) = (self.info().to_string(), label);
+            return Err(GpuError::BindingTooSmall { adapter, what, needed: bytes, limit });
+        }
+        self.buffer(label, bytes, usage)
+    }
+
     /// A buffer with contents.
     pub(crate) fn buffer_with(
         &self,

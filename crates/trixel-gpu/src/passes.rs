@@ -11,7 +11,7 @@ use crate::limits::{SCAN_BLOCK, WORKGROUP};
 use crate::mesh::GpuMesh;
 use crate::pipelines::bind;
 use crate::scratch::{List, Lists, Scratch, Status};
-use crate::shader::{Raster, Stage, Variant};
+use crate::shader::{Raster, Sink, Stage, Variant};
 use crate::timer::Timer;
 use crate::volume::{GpuVolume, Slab};
 use crate::voxelizer::Classification;
@@ -28,6 +28,8 @@ pub(crate) struct Setting<'a> {
     pub(crate) cutoff: Cutoff,
     pub(crate) mesh: &'a GpuMesh,
     pub(crate) volume: &'a GpuVolume,
+    /// The list that voxels are appended to, where the variant's sink has one.
+    pub(crate) appended: Option<&'a wgpu::Buffer>,
     pub(crate) scratch: &'a mut Scratch,
     pub(crate) timer: Option<&'a mut Timer>,
 }
@@ -93,6 +95,8 @@ struct Recorder<'a> {
     target_size: u32,
     /// The most triangles of any unit: what lists must hold.
     capacity: u32,
+    /// Group 2 of stages that append.
+    append_group: Option<wgpu::BindGroup>,
 }
 
 impl<'a> Recorder<'a> {
@@ -106,11 +110,18 @@ impl<'a> Recorder<'a> {
         encoder.clear_buffer(&setting.scratch.counters, 0, None);
         encoder.clear_buffer(&status.buffer, 0, None);
         let (target_size, capacity) = (layout.target_size, layout.most_triangles);
-        Ok((Self { setting, encoder, status, target_size, capacity }, layout))
+        let append_group = setting
+            .appended
+            .map(|appended| bind(gpu, &gpu.pipelines().layouts().append, &[appended.as_entire_binding()]));
+        Ok((Self { setting, encoder, status, target_size, capacity, append_group }, layout))
     }
 
     /// Clears a slab, or fills it with the next of `words`.
     fn initialize(&mut self, slab: &Slab, words: &mut Option<&[u8]>) -> Result<(), GpuError> {
+        if self.setting.variant.sink == Sink::Fragments {
+            // The bits are not looked at.
+            return Ok(());
+        }
         let bytes = self.setting.volume.slab_bytes(slab);
         let Some(rest) = words else {
             self.encoder.clear_buffer(slab.buffer(), 0, Some(bytes));
@@ -223,6 +234,9 @@ impl<'a> Recorder<'a> {
             pass.set_pipeline(&pipeline);
             pass.set_bind_group(0, &unit.bind_group, &[*window]);
             pass.set_bind_group(1, &group, &[]);
+            if let Some(group) = &self.append_group {
+                pass.set_bind_group(2, group, &[]);
+            }
             match list {
                 Some(list) => pass.draw_indirect(&list.arguments, 0),
                 None => pass.draw(0..unit.chunk.triangles * dilation.vertices(), 0..1),
@@ -304,10 +318,14 @@ impl<'a> Recorder<'a> {
     }
 
     fn pass(&mut self, name: &'static str) -> wgpu::ComputePass<'_> {
-        self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+        let mut pass = self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some(name),
             timestamp_writes: self.setting.timer.as_mut().and_then(|timer| timer.compute(name)),
-        })
+        });
+        if let Some(group) = &self.append_group {
+            pass.set_bind_group(2, group, &[]);
+        }
+        pass
     }
 
     fn pipeline(&self, stage: Stage) -> wgpu::ComputePipeline {

@@ -5,7 +5,8 @@ use std::hash::Hash;
 use std::sync::{Mutex, PoisonError};
 
 use crate::gpu::Gpu;
-use crate::shader::{self, Raster, Stage, Variant};
+use crate::kernel::Kernels;
+use crate::shader::{self, Raster, Sink, Stage, Variant};
 
 /// Which shader stages see a binding, and how.
 #[derive(Clone, Copy)]
@@ -26,6 +27,7 @@ pub(crate) struct Pipelines {
     layouts: Layouts,
     compute: Kept<Stage, wgpu::ComputePipeline>,
     raster: Kept<Raster, wgpu::RenderPipeline>,
+    kernels: Kernels,
 }
 
 /// Pipelines by what they are for.
@@ -51,6 +53,8 @@ pub(crate) struct Layouts {
     pub(crate) expand: wgpu::BindGroupLayout,
     pub(crate) scan: wgpu::BindGroupLayout,
     pub(crate) arguments: wgpu::BindGroupLayout,
+    /// Group 2 of stages that append voxels to a list.
+    pub(crate) append: wgpu::BindGroupLayout,
 }
 
 impl Layouts {
@@ -72,10 +76,11 @@ impl Layouts {
             expand: layout(device, &[Slot::Parameters, read, write]),
             scan: layout(device, &[Slot::Parameters, write, write]),
             arguments: layout(device, &[read, write]),
+            append: layout(device, &[Slot::Write(writers)]),
         }
     }
 
-    fn of(&self, stage: Stage) -> Vec<Option<&wgpu::BindGroupLayout>> {
+    fn of(&self, stage: Stage, sink: Sink) -> Vec<Option<&wgpu::BindGroupLayout>> {
         let second = match stage {
             Stage::TriangleParallel { .. } => Some(&self.list_write),
             Stage::TriangleList { .. } | Stage::Balanced => Some(&self.list_read),
@@ -89,7 +94,9 @@ impl Layouts {
             Stage::Arguments { .. } => &self.arguments,
             _ => &self.common,
         };
-        [first].into_iter().chain(second).map(Some).collect()
+        let third = (sink != Sink::Bits && stage.writes_voxels()).then_some(&self.append);
+        let groups = if third.is_some() { 3 } else { 1 + usize::from(second.is_some()) };
+        [Some(first), second, third].into_iter().take(groups).collect()
     }
 }
 
@@ -135,11 +142,20 @@ pub(crate) fn bind(
 
 impl Pipelines {
     pub(crate) fn new(device: &wgpu::Device) -> Self {
-        Self { layouts: Layouts::new(device), compute: Kept::default(), raster: Kept::default() }
+        Self {
+            layouts: Layouts::new(device),
+            compute: Kept::default(),
+            raster: Kept::default(),
+            kernels: Kernels::default(),
+        }
     }
 
     pub(crate) fn layouts(&self) -> &Layouts {
         &self.layouts
+    }
+
+    pub(crate) fn kernels(&self) -> &Kernels {
+        &self.kernels
     }
 
     /// The pipeline of a compute stage. Errors go to the device's error scopes.
@@ -147,7 +163,8 @@ impl Pipelines {
         keep(&self.compute, (stage, variant), || {
             let label = Some(stage.entry_point());
             let source = shader::source(stage, variant, gpu.info().tier, gpu.limits().groups);
-            let (module, layout) = module_and_layout(gpu.device(), label, source, &self.layouts.of(stage));
+            let (module, layout) =
+                module_and_layout(gpu.device(), label, source, &self.layouts.of(stage, variant.sink));
             gpu.device().create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label,
                 layout: Some(&layout),
@@ -164,8 +181,9 @@ impl Pipelines {
         keep(&self.raster, (raster, variant), || {
             let label = Some(Raster::FRAGMENT_ENTRY_POINT);
             let source = shader::raster_source(raster, variant, gpu.info().tier);
-            let layouts = [Some(&self.layouts.common), Some(&self.layouts.list_draw)];
-            let (module, layout) = module_and_layout(gpu.device(), label, source, &layouts);
+            let layouts = [&self.layouts.common, &self.layouts.list_draw, &self.layouts.append].map(Some);
+            let groups = if variant.sink == Sink::Bits { &layouts[..2] } else { &layouts };
+            let (module, layout) = module_and_layout(gpu.device(), label, source, groups);
             gpu.device().create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label,
                 layout: Some(&layout),

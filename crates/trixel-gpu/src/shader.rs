@@ -9,6 +9,7 @@ use crate::tier::Tier;
 macro_rules! shader {
     ($($file:literal)*) => { &[$(include_str!(concat!("shaders/", $file, ".wgsl"))),*] };
 }
+pub(crate) use shader;
 
 /// A step of a voxelization that has its own compute pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -52,6 +53,19 @@ impl Stage {
         }
     }
 
+    /// Whether voxels are written, and so may be appended to a list.
+    pub(crate) fn writes_voxels(self) -> bool {
+        match self {
+            Self::TriangleParallel { .. } | Self::TriangleList { .. } | Self::Balanced | Self::Fill => true,
+            Self::Classify { .. }
+            | Self::CountColumns
+            | Self::Expand
+            | Self::ScanBlocks
+            | Self::AddTotals
+            | Self::Arguments { .. } => false,
+        }
+    }
+
     fn files(self) -> &'static [&'static str] {
         match self {
             Self::TriangleParallel { .. } => shader!(
@@ -89,11 +103,37 @@ impl Raster {
 pub(crate) struct Variant {
     pub(crate) mode: Mode,
     pub(crate) counting: bool,
+    pub(crate) sink: Sink,
+}
+
+/// Where voxels go: `SINK` of `voxels.wgsl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(crate) enum Sink {
+    #[default]
+    Bits,
+    /// To the bits, and to a list by whoever sets one.
+    List,
+    /// To a list alone, once for every triangle.
+    Fragments,
+}
+
+impl Sink {
+    fn code(self) -> u32 {
+        match self {
+            Self::Bits => 0,
+            Self::List => 1,
+            Self::Fragments => 2,
+        }
+    }
+
+    fn files(self) -> &'static [&'static str] {
+        if self == Self::Bits { shader!("entry" "no_append") } else { shader!("entry" "append") }
+    }
 }
 
 impl Variant {
     /// Of stages that are the same in every mode.
-    pub(crate) const ANY: Self = Self { mode: Mode::Conservative, counting: false };
+    pub(crate) const ANY: Self = Self { mode: Mode::Conservative, counting: false, sink: Sink::Bits };
 }
 
 /// The WGSL of a compute stage.
@@ -112,7 +152,7 @@ pub(crate) fn source(stage: Stage, variant: Variant, tier: Tier, max_groups: u32
         }
         _ => {}
     }
-    assemble(variant, tier, &constants, stage.files())
+    assemble(variant, tier, &constants, stage.files(), stage.writes_voxels())
 }
 
 /// The WGSL of a vertex and a fragment stage.
@@ -120,10 +160,11 @@ pub(crate) fn raster_source(raster: Raster, variant: Variant, tier: Tier) -> Str
     let (listed, dilation) = (raster.listed, raster.dilation.code());
     let constants =
         format!("const SMALL: bool = false;\nconst LISTED: bool = {listed};\nconst DILATION: u32 = {dilation}u;\n");
-    assemble(variant, tier, &constants, Raster::FILES)
+    assemble(variant, tier, &constants, Raster::FILES, true)
 }
 
-fn assemble(variant: Variant, tier: Tier, constants: &str, files: &[&str]) -> String {
+/// `writes` says whether voxels are written.
+fn assemble(variant: Variant, tier: Tier, constants: &str, files: &[&str], writes: bool) -> String {
     let mode = match variant.mode {
         Mode::Conservative => 0,
         Mode::Thin => 1,
@@ -138,18 +179,26 @@ fn assemble(variant: Variant, tier: Tier, constants: &str, files: &[&str]) -> St
         Tier::Portable => include_str!("shaders/product_portable.wgsl"),
         Tier::Int64 => include_str!("shaders/product_int64.wgsl"),
     };
-    [&[shared.as_str(), constants, product], files].concat().join("\n")
+    let sink = variant.sink;
+    let (code, listing) = (sink.code(), sink == Sink::List);
+    let sinks = format!("const SINK: u32 = {code}u;\nconst LISTING: bool = {listing};\n");
+    let constants: &[&str] = &[shared.as_str(), sinks.as_str(), constants, product];
+    [constants, files, if writes { sink.files() } else { &[] }].concat().join("\n")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::Kernel;
 
-    const VARIANTS: [Variant; 8] = {
-        let mut variants = [Variant::ANY; 8];
+    const SINKS: [Sink; 4] = [Sink::Bits, Sink::List, Sink::Fragments, Sink::Bits];
+
+    /// Every mode with every sink, half of them counting.
+    const VARIANTS: [Variant; 16] = {
+        let mut variants = [Variant::ANY; 16];
         let mut i = 0;
         while i < variants.len() {
-            variants[i] = Variant { mode: Mode::ALL[i / 2], counting: i % 2 == 1 };
+            variants[i] = Variant { mode: Mode::ALL[i / 4], counting: (i / 4 + i) % 2 == 1, sink: SINKS[i % 4] };
             i += 1;
         }
         variants
@@ -195,6 +244,13 @@ mod tests {
                     assert_valid(&source(stage, variant, tier, 65_535), tier, &[stage.entry_point()]);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn every_kernel_is_valid() {
+        for kernel in Kernel::all() {
+            assert_valid(&kernel.source(), Tier::Portable, &[kernel.entry_point()]);
         }
     }
 

@@ -67,6 +67,13 @@ impl GpuVolume {
         Ok(Self { grid, column_words, slabs })
     }
 
+    /// One slab without room for its voxels, for what writes none.
+    pub(crate) fn without_voxels(gpu: &Gpu, grid: Grid) -> Result<Self, GpuError> {
+        let [nx, _, nz] = grid.dims();
+        let buffer = gpu.buffer("trixel no voxels", 4, wgpu::BufferUsages::STORAGE)?;
+        Ok(Self { grid, column_words: nz.div_ceil(WORD_BITS) * 2, slabs: vec![Slab { buffer, x: 0, nx }] })
+    }
+
     /// The grid.
     #[must_use]
     pub fn grid(&self) -> &Grid {

@@ -1,18 +1,19 @@
 //! Voxelizing meshes that are on the GPU, into voxels that stay there.
 
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, CpuBackend, Job, Mode, Strategy, Volume, WORD_BITS};
+use trixel::{Backend, CpuBackend, Job, Mode, Strategy, Volume, VoxelOrder, WORD_BITS};
 
 use crate::counters::{self, Counters};
 use crate::cutoff::{Cutoff, Dilation};
 use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::limits::MAX_PAIRS;
+use crate::lists::{self, GpuVoxelList, ListMethod};
 use crate::mesh::GpuMesh;
 use crate::passes;
 use crate::probe;
 use crate::scratch::{Lists, Scratch};
-use crate::shader::Variant;
+use crate::shader::{Sink, Variant};
 use crate::timer::{PassTime, Timer};
 use crate::volume::GpuVolume;
 
@@ -104,7 +105,7 @@ impl Voxelizer {
             strategy,
             dilation: options.dilation,
             cutoff: options.cutoff.unwrap_or_else(|| Cutoff::default_for(gpu.info(), Default::default())),
-            variant: Variant { mode: job.mode(), counting: options.count },
+            variant: Variant { mode: job.mode(), counting: options.count, sink: Sink::Bits },
             scratch: Scratch::new(gpu)?,
             timer: Timer::new(gpu)?,
         })
@@ -138,7 +139,7 @@ impl Voxelizer {
         mesh: &GpuMesh,
         volume: &GpuVolume,
     ) -> Result<(), GpuError> {
-        self.record_with(encoder, mesh, volume, None)
+        self.record_with(encoder, mesh, volume, None, None)
     }
 
     /// Sorts the triangles of `mesh` into small and large, for [`Voxelizer::record_classified`]. Runs at once.
@@ -148,7 +149,7 @@ impl Voxelizer {
     pub fn classify(&mut self, mesh: &GpuMesh, volume: &GpuVolume) -> Result<Classification, GpuError> {
         self.submit(|voxelizer, encoder| {
             let gpu = voxelizer.gpu.clone();
-            gpu.guarded(|| passes::record_classification(voxelizer.setting(mesh, volume)?, encoder))?
+            gpu.guarded(|| passes::record_classification(voxelizer.setting(mesh, volume, None)?, encoder))?
         })
     }
 
@@ -164,7 +165,7 @@ impl Voxelizer {
         volume: &GpuVolume,
         classification: &Classification,
     ) -> Result<(), GpuError> {
-        self.record_with(encoder, mesh, volume, Some(classification))
+        self.record_with(encoder, mesh, volume, Some(classification), None)
     }
 
     fn record_with(
@@ -173,17 +174,24 @@ impl Voxelizer {
         mesh: &GpuMesh,
         volume: &GpuVolume,
         classification: Option<&Classification>,
+        appended: Option<(Sink, &wgpu::Buffer)>,
     ) -> Result<(), GpuError> {
         let strategy = if classification.is_some() { Strategy::HybridTwoPass } else { self.strategy };
         let initial = self.cpu_part(mesh)?;
         let gpu = self.gpu.clone();
         // One guard around everything: most of what is recorded is only checked by the driver much later.
         gpu.guarded(|| {
-            passes::record(self.setting(mesh, volume)?, encoder, strategy, classification, initial.as_ref())
+            let setting = self.setting(mesh, volume, appended)?;
+            passes::record(setting, encoder, strategy, classification, initial.as_ref())
         })?
     }
 
-    fn setting<'a>(&'a mut self, mesh: &'a GpuMesh, volume: &'a GpuVolume) -> Result<passes::Setting<'a>, GpuError> {
+    fn setting<'a>(
+        &'a mut self,
+        mesh: &'a GpuMesh,
+        volume: &'a GpuVolume,
+        appended: Option<(Sink, &'a wgpu::Buffer)>,
+    ) -> Result<passes::Setting<'a>, GpuError> {
         if volume.grid() != self.job.grid() {
             return Err(GpuError::GridMismatch);
         }
@@ -193,18 +201,19 @@ impl Voxelizer {
         Ok(passes::Setting {
             gpu: &self.gpu,
             job: &self.job,
-            variant: self.variant,
+            variant: Variant { sink: appended.map_or(Sink::Bits, |(sink, _)| sink), ..self.variant },
             dilation: self.dilation,
             cutoff: self.cutoff,
             mesh,
             volume,
+            appended: appended.map(|(_, buffer)| buffer),
             scratch: &mut self.scratch,
             timer: self.timer.as_mut(),
         })
     }
 
     /// What the triangles too large for the shaders set; in mode solid as toggles.
-    fn cpu_part(&self, mesh: &GpuMesh) -> Result<Option<Volume>, GpuError> {
+    pub(crate) fn cpu_part(&self, mesh: &GpuMesh) -> Result<Option<Volume>, GpuError> {
         let Some(leftover) = &mesh.leftover else { return Ok(None) };
         let mesh: LatticeMesh<'_> = leftover.mesh();
         let mut volume = Volume::new(*self.job.grid()).map_err(trixel::Error::from)?;
@@ -234,6 +243,43 @@ impl Voxelizer {
     /// As for [`Voxelizer::record`] and [`Voxelizer::check`].
     pub fn run(&mut self, mesh: &GpuMesh, volume: &GpuVolume) -> Result<(), GpuError> {
         self.submit(|voxelizer, encoder| voxelizer.record(encoder, mesh, volume))
+    }
+
+    /// [`Voxelizer::run`] that also appends the voxels to a list. In mode solid only [`Sink::List`] can.
+    pub(crate) fn run_appending(
+        &mut self,
+        mesh: &GpuMesh,
+        volume: &GpuVolume,
+        appended: (Sink, &wgpu::Buffer),
+    ) -> Result<(), GpuError> {
+        self.submit(|voxelizer, encoder| voxelizer.record_with(encoder, mesh, volume, None, Some(appended))).map(drop)
+    }
+
+    /// The sorted list of the voxels of `mesh`, made by `method`; its bits, where it needs them, are its own. Use
+    /// [`GpuVoxelList::of`] for voxels that are there already.
+    ///
+    /// # Errors
+    /// As for [`Voxelizer::run`], and when the list exceeds what the adapter binds or the method has no list for the mode.
+    pub fn list(&mut self, mesh: &GpuMesh, method: ListMethod, order: VoxelOrder) -> Result<GpuVoxelList, GpuError> {
+        match method {
+            ListMethod::Atomic | ListMethod::FragmentList => lists::append(self, mesh, method, order),
+            ListMethod::Scan | ListMethod::Histopyramid => {
+                let volume = GpuVolume::new(&self.gpu, *self.job.grid())?;
+                self.run(mesh, &volume)?;
+                GpuVoxelList::of(&self.gpu, &volume, method, order)
+            }
+        }
+    }
+
+    /// The device.
+    pub(crate) fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// The job.
+    #[must_use]
+    pub fn job(&self) -> &Job {
+        &self.job
     }
 
     /// [`Voxelizer::run`] with a classification made before.

@@ -4,6 +4,7 @@
 //! follows the surface, also of a solid. The bricks over 64 x 64 columns make a *pillar*; a pillar is built by one
 //! thread and never changed after.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::grid::Grid;
@@ -268,6 +269,40 @@ impl BrickMap {
     #[must_use]
     pub fn empty(grid: Grid) -> Self {
         Self { grid, covered: [0..0, 0..0], pillars: Vec::new() }
+    }
+
+    /// A map of bricks that were made elsewhere: each the place of an 8 x 8 x 8 cube, in cubes, and its voxels, bit z of
+    /// byte y of word x. In any order; of two of one place the last counts. Voxels outside the grid must not be set, and
+    /// bricks outside are left out.
+    #[must_use]
+    pub fn from_bricks(grid: Grid, bricks: impl IntoIterator<Item = ([u32; 3], [u64; 8])>) -> Self {
+        let side = PILLAR_SIDE / BRICK_SIDE;
+        let dims = grid.dims().map(|n| n.div_ceil(BRICK_SIDE));
+        let inside = |&([x, y, z], _): &([u32; 3], Brick)| x < dims[0] && y < dims[1] && z < dims[2];
+        let mut sorted: BTreeMap<[u32; 2], BTreeMap<(u8, u16), Brick>> = BTreeMap::new();
+        for ([x, y, z], brick) in bricks.into_iter().filter(inside) {
+            // A bar is below 64, and a grid below 2^15 voxels high.
+            let bar = u8::try_from(x % side * side + y % side).unwrap_or(u8::MAX);
+            let height = u16::try_from(z).unwrap_or(u16::MAX);
+            sorted.entry([x / side, y / side]).or_default().insert((bar, height), brick);
+        }
+        let range = |along: fn(&[u32; 2]) -> u32| {
+            let ends = sorted.keys().map(along);
+            let first = ends.clone().min().unwrap_or(0);
+            first..ends.max().map_or(0, |last| last + 1)
+        };
+        let covered = [range(|pillar| pillar[0]), range(|pillar| pillar[1])];
+        let mut builder = PillarBuilder::default();
+        let places = covered[0].clone().flat_map(|px| covered[1].clone().map(move |py| [px, py]));
+        let pillars = places
+            .map(|place| {
+                for (&(bar, height), brick) in sorted.get(&place).into_iter().flatten() {
+                    builder.push(bar, height, brick);
+                }
+                builder.finish()
+            })
+            .collect();
+        Self::new(grid, covered, pillars)
     }
 
     /// How many pillars a grid has along x and y: pieces of 64 x 64 columns, which are computed one by one.

@@ -107,6 +107,9 @@ pub enum OctreeError {
     /// There are more nodes or voxels with attributes than 32-bit pointers reach.
     #[error("the octree has more than 4,294,967,295 nodes or voxels; choose a lower resolution")]
     TooLarge,
+    /// Nodes that are no octree's.
+    #[error("node {0} of the octree's nodes is not what the nodes before it call for")]
+    Nodes(usize),
     /// The attributes are of another volume.
     #[error("the attributes describe another grid; compute them for this volume")]
     GridMismatch,
@@ -121,8 +124,7 @@ impl Octree {
         if described.is_some_and(|described| described.rank().volume().grid() != volume.grid()) {
             return Err(OctreeError::GridMismatch);
         }
-        let longest = volume.grid().dims().into_iter().max().unwrap_or(1);
-        let height = longest.next_power_of_two().trailing_zeros().max(1);
+        let height = height_of(volume.grid());
         let bare = described.map(|described| without_covered(volume, described)).transpose()?;
         let pyramid = Pyramid::new(volume, bare.as_ref().unwrap_or(volume), height)?;
         let mut tree = Self {
@@ -175,6 +177,44 @@ impl Octree {
             tree.average(&looks);
         }
         Ok(tree)
+    }
+
+    /// An octree without attributes of nodes that were built elsewhere, level by level from the root as
+    /// [`Octree::nodes`] has them. Without nodes the root's cube is full if `everything`, else empty.
+    ///
+    /// # Errors
+    /// When the nodes are not those that [`Octree::new`] would make.
+    pub fn from_nodes(grid: Grid, nodes: Vec<Node>, everything: bool) -> Result<Self, OctreeError> {
+        let height = height_of(&grid);
+        let mut levels = vec![0];
+        let mut end = usize::from(!nodes.is_empty());
+        for level in (1..=height).rev() {
+            let start = *levels.last().unwrap_or(&0);
+            let mut next = end;
+            for (index, node) in nodes.iter().enumerate().take(end).skip(start) {
+                let first = if level == 1 { 0 } else { next };
+                let full = if level == 1 { node.some } else { node.full };
+                let fits = node.some != 0 && node.full != u8::MAX && node.full & !node.some == 0 && node.full == full;
+                if !fits || node.first as usize != first {
+                    return Err(OctreeError::Nodes(index));
+                }
+                next += (node.some & !node.full).count_ones() as usize;
+            }
+            if end > nodes.len() {
+                return Err(OctreeError::Nodes(nodes.len()));
+            }
+            levels.push(end);
+            end = next;
+        }
+        if end != nodes.len() {
+            return Err(OctreeError::Nodes(end));
+        }
+        let root = match (nodes.is_empty(), everything) {
+            (false, _) => Content::Some,
+            (true, false) => Content::Nothing,
+            (true, true) => Content::Everything,
+        };
+        Ok(Self { grid, height, root, nodes, levels, node_looks: Vec::new(), voxel_looks: Vec::new() })
     }
 
     /// Averages the voxels' attributes upwards; pruned cubes have none.
@@ -360,6 +400,12 @@ impl Octree {
             self.first_hit(ray, index, content, at - 1, child_of(cube, octant), span)
         })
     }
+}
+
+/// The levels of nodes over a grid.
+fn height_of(grid: &Grid) -> u32 {
+    let longest = grid.dims().into_iter().max().unwrap_or(1);
+    longest.next_power_of_two().trailing_zeros().max(1)
 }
 
 /// A ray in voxels.
@@ -620,6 +666,29 @@ mod tests {
                 .cells(0)
                 .is_empty()
         );
+    }
+
+    #[test]
+    fn trees_of_nodes_are_checked() {
+        let mut random = Random::new(33);
+        for dims in [[40, 33, 70], [1, 1, 1], [64, 64, 64]] {
+            let tree = Octree::new(&random_volume(&mut random, dims), None).unwrap();
+            let again = Octree::from_nodes(*tree.grid(), tree.nodes().to_vec(), false);
+            assert_eq!(again.as_ref(), Ok(&tree), "{dims:?}");
+            let last = tree.nodes().len() - 1;
+            for change in [|n: &mut Node| n.first += 1, |n: &mut Node| n.some = 0, |n: &mut Node| n.full = u8::MAX] {
+                let mut nodes = tree.nodes().to_vec();
+                change(&mut nodes[last]);
+                assert_eq!(Octree::from_nodes(*tree.grid(), nodes, false), Err(OctreeError::Nodes(last)));
+            }
+            let fewer = Octree::from_nodes(*tree.grid(), tree.nodes()[..last].to_vec(), false);
+            assert!(fewer.is_err() || last == 0, "{dims:?}");
+            let more = [tree.nodes(), &tree.nodes()[last..]].concat();
+            assert_eq!(Octree::from_nodes(*tree.grid(), more, false), Err(OctreeError::Nodes(last + 1)));
+        }
+        let grid = Grid::new([0.0; 3], [1.0; 3], [8; 3]).unwrap();
+        assert!(Octree::from_nodes(grid, Vec::new(), true).unwrap().get([7; 3]));
+        assert!(!Octree::from_nodes(grid, Vec::new(), false).unwrap().get([7; 3]));
     }
 
     #[test]

@@ -1,4 +1,5 @@
 // Mode solid: carries the parity toggles upwards, so that a voxel is set when an odd number of toggles lie at or below it.
+// Where voxels are listed, they are now: LISTING is prepended.
 
 @group(0) @binding(3) var<storage, read_write> voxels: array<u32>;
 
@@ -15,6 +16,7 @@ fn fill(
     let start = column * params.column_words;
     let end = start + (u32(params.dims.z) + 31u) / 32u;
     var carry = 0u;
+    let at = vec2<u32>(u32(params.slab_x) + column / u32(params.dims.y), column % u32(params.dims.y));
     for (var i = start; i < end; i++) {
         var word = voxels[i];
         if (word | carry) == 0u {
@@ -32,5 +34,8 @@ fn fill(
             word &= 0xffffffffu >> (31u - ((u32(params.dims.z) - 1u) & 31u));
         }
         voxels[i] = word;
+        if LISTING && word != 0u {
+            append(at, 32u * (i - start), word);
+        }
     }
 }

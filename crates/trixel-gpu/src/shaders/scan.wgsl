@@ -32,8 +32,13 @@ fn store(i: u32, value: u32) {
 }
 
 @compute @workgroup_size(THREADS)
-fn scan_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let start = (group.x * THREADS + local) * PER_THREAD;
+fn scan_blocks(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let block = group.y * groups.x + group.x;
+    let start = (block * THREADS + local) * PER_THREAD;
     let v = vec4<u32>(load(start), load(start + 1u), load(start + 2u), load(start + 3u));
     let own = add(add(v.x, v.y), add(v.z, v.w));
     sums[local] = own;
@@ -57,15 +62,21 @@ fn scan_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     sum = add(sum, v.y);
     store(start + 2u, sum);
     store(start + 3u, add(sum, v.z));
-    if local == THREADS - 1u {
-        totals[group.x] = sums[local];
+    // A dispatch of two dimensions may have workgroups too many.
+    if local == THREADS - 1u && (block == 0u || block * THREADS * PER_THREAD < length.elements) {
+        totals[block] = sums[local];
     }
 }
 
 @compute @workgroup_size(THREADS)
-fn add_totals(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let start = (group.x * THREADS + local) * PER_THREAD;
-    let before = totals[group.x];
+fn add_totals(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let block = group.y * groups.x + group.x;
+    let start = (block * THREADS + local) * PER_THREAD;
+    let before = totals[block];
     for (var i = start; i < start + PER_THREAD; i++) {
         store(i, add(load(i), before));
     }
