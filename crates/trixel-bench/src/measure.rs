@@ -152,7 +152,7 @@ impl Bench<'_> {
         let mut contestants = vec![];
         for &strategy in &self.plan.strategies {
             self.tell(strategy.name());
-            let options = Options { cutoff: Some(cutoff), ..Options::default() };
+            let options = Options { cutoff, ..Options::default() };
             let mut voxelizer = Voxelizer::new(gpu, &self.job.with_strategy(strategy), &options)?;
             voxelizer.run(&mesh, &volume)?;
             let wrong_voxels = wrong_voxels(gpu, &volume, &right)?;
@@ -165,12 +165,12 @@ impl Bench<'_> {
         }
         for Contestant { strategy, voxelizer, mut times, wrong_voxels } in contestants {
             let mut cell = self.cell("gpu", strategy, &mut times, voxels);
-            cell.cutoff = is_hybrid(strategy).then_some(cutoff.value);
+            cell.cutoff = cutoff.filter(|_| is_hybrid(strategy)).map(|cutoff| cutoff.value);
             cell.passes_ms = voxelizer.pass_times()?.iter().map(|pass| (pass.name.to_owned(), pass.ms)).collect();
             cell.wrong_voxels = wrong_voxels;
             if self.plan.count {
                 self.tell(&format!("{strategy}, counting"));
-                let options = Options { cutoff: Some(cutoff), count: true, ..Options::default() };
+                let options = Options { cutoff, count: true, ..Options::default() };
                 let mut counting = Voxelizer::new(gpu, &self.job.with_strategy(strategy), &options)?;
                 counting.run(&mesh, &volume)?;
                 cell.counters = Some(counting.check()?.into());
@@ -187,17 +187,20 @@ impl Bench<'_> {
         (self.progress)(&format!("{} at {}: {what}", self.name, self.resolution));
     }
 
-    /// The plan's cutoff, or the best that a search finds.
-    fn cutoff(&self, gpu: &Gpu, mesh: &GpuMesh) -> Result<Cutoff, GpuError> {
+    /// The plan's cutoff, or the best that a search finds; none for meshes so small that the hybrid does without.
+    fn cutoff(&self, gpu: &Gpu, mesh: &GpuMesh) -> Result<Option<Cutoff>, GpuError> {
+        const TINY: u64 = 64;
         let heuristic = Heuristic::ProjectedArea;
         if let Some(value) = self.plan.cutoff {
-            return Ok(Cutoff { heuristic, value });
+            return Ok(Some(Cutoff { heuristic, value }));
         }
-        if !self.plan.strategies.iter().any(|strategy| is_hybrid(*strategy)) {
-            return Ok(Cutoff::default_for(gpu.info(), heuristic));
+        if mesh.triangles() < TINY || !self.plan.strategies.iter().any(|strategy| is_hybrid(*strategy)) {
+            return Ok(None);
         }
         self.tell("searching the cutoff");
-        Ok(trixel_gpu::tune(gpu, mesh, &self.job, &Options::default(), heuristic, self.plan.runs, |_| {})?.best)
+        let options = Options::default();
+        let tuning = trixel_gpu::tune(gpu, mesh, &self.job, &options, heuristic, self.plan.runs, |_| {})?;
+        Ok(Some(tuning.best))
     }
 
     fn sweep(&self, gpu: &Gpu, mesh: &GpuMesh, volume: &GpuVolume, cutoffs: &[f32]) -> Result<Sweep, GpuError> {

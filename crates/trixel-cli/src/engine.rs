@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::Result;
 use trixel::lattice::LatticeMesh;
 use trixel::{Backend, CpuBackend, Job, Strategy, Volume};
-use trixel_gpu::{AdapterChoice, Cutoff, Gpu, GpuError, GpuMesh, GpuVolume, Options, STRATEGIES, Voxelizer};
+use trixel_gpu::{AdapterChoice, Cutoff, Gpu, GpuError, GpuMesh, GpuVolume, Heuristic, Options, STRATEGIES, Voxelizer};
 
 use crate::args::{BackendArg, MethodArgs};
 use crate::grid::usage;
@@ -92,13 +92,15 @@ impl Engine {
             }
             Err(error) => return Err(error.into()),
         };
-        let heuristic = method.gpu.heuristic.into();
+        let heuristic: Heuristic = method.gpu.heuristic.into();
         let cutoff = method.gpu.cutoff.map(|value| Cutoff { heuristic, value });
-        let cutoff = cutoff
-            .or_else(|| tuned::load(gpu.info(), heuristic, reporter))
-            .unwrap_or_else(|| Cutoff::default_for(gpu.info(), heuristic));
-        let options =
-            Options { cutoff: Some(cutoff), dilation: method.gpu.dilation.into(), count: method.gpu.counters };
+        let cutoff = cutoff.or_else(|| tuned::load(gpu.info(), heuristic, reporter));
+        let default = heuristic == Heuristic::default();
+        let options = Options {
+            cutoff: cutoff.or_else(|| (!default).then(|| Cutoff::default_for(gpu.info(), heuristic))),
+            dilation: method.gpu.dilation.into(),
+            count: method.gpu.counters,
+        };
         Ok(Self::Gpu { gpu: Box::new(gpu), options, cpu_may_help: !asked && !of_gpu })
     }
 

@@ -58,6 +58,11 @@ pub enum AdapterChoice {
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::PRIMARY;
+    // Arguments of indirect calls are written by trixel's own shaders, within the limits; a tenth of a millisecond for each
+    // to be looked at again is much on a small mesh. Direct3D needs the look, or it gives no number of workgroups.
+    if !cfg!(windows) {
+        descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
+    }
     wgpu::Instance::new(descriptor)
 }
 

@@ -26,6 +26,7 @@ pub(crate) struct Setting<'a> {
     pub(crate) variant: Variant,
     pub(crate) dilation: Dilation,
     pub(crate) cutoff: Cutoff,
+    pub(crate) whole_below: u32,
     pub(crate) mesh: &'a GpuMesh,
     pub(crate) volume: &'a GpuVolume,
     /// The list that voxels are appended to, where the variant's sink has one.
@@ -146,34 +147,42 @@ impl<'a> Recorder<'a> {
 
     fn triangle_parallel(&mut self, unit: &Unit<'_>) -> Result<(), GpuError> {
         let list = self.lists()?.large;
-        let rest = self.pipeline(Stage::TriangleList { small: false });
+        self.encoder.clear_buffer(&list.count, 0, None);
+        let written = self.list_group(&list, true);
         let read = self.list_group(&list, false);
-        let mut pass = self.small_triangles(unit, Stage::TriangleParallel { defers: None }, &list, 3);
+        let arguments = self.arguments_group(&list.count, &list.arguments);
+        let first = self.pipeline(Stage::TriangleParallel { defers: None });
+        let count = self.pipeline(Stage::Arguments { vertices: 0 });
+        let rest = self.pipeline(Stage::TriangleList { small: false });
+        let groups = self.groups(unit.chunk.triangles);
+        let mut pass = self.pass("triangle-parallel");
+        run(&mut pass, &first, &unit.bind_group, Some(unit.parameters), Some(&written), groups);
+        run(&mut pass, &count, &arguments, None, None, [1, 1]);
         for share in [unit.parameters].iter().chain(&unit.later_shares) {
             run_indirect(&mut pass, &rest, &unit.bind_group, *share, &read, &list.arguments);
         }
         Ok(())
     }
 
+    /// The list's length is counted where the draw reads it: a dispatch less than by way of `arguments.wgsl`, which shows on
+    /// small meshes.
     fn hybrid(&mut self, unit: &Unit<'_>) -> Result<(), GpuError> {
+        let Setting { gpu, cutoff, dilation, whole_below, .. } = self.setting;
+        if unit.chunk.triangles < whole_below {
+            return self.fragment_parallel(unit, None);
+        }
         let list = self.lists()?.large;
-        let stage = Stage::TriangleParallel { defers: Some(self.setting.cutoff.heuristic) };
-        drop(self.small_triangles(unit, stage, &list, self.setting.dilation.vertices()));
-        self.fragment_parallel(unit, Some(&list))
-    }
-
-    /// The pass that voxelizes the small triangles and leaves the others in a list, with the arguments to go over it.
-    fn small_triangles(&mut self, unit: &Unit<'_>, stage: Stage, list: &List, vertices: u32) -> wgpu::ComputePass<'_> {
-        self.encoder.clear_buffer(&list.count, 0, None);
-        let written = self.list_group(list, true);
-        let arguments = self.arguments_group(&list.count, &list.arguments);
-        let first = self.pipeline(stage);
-        let count = self.pipeline(Stage::Arguments { vertices });
+        let no_draw = &self.setting.scratch.no_draw;
+        self.encoder.copy_buffer_to_buffer(no_draw, 0, &list.arguments, 0, no_draw.size());
+        let written = [&list.triangles, &list.arguments].map(wgpu::Buffer::as_entire_binding);
+        let written = bind(gpu, &gpu.pipelines().layouts().list_write, &written);
+        let defers = Some((cutoff.heuristic, dilation.vertices()));
+        let first = self.pipeline(Stage::TriangleParallel { defers });
         let groups = self.groups(unit.chunk.triangles);
         let mut pass = self.pass("triangle-parallel");
         run(&mut pass, &first, &unit.bind_group, Some(unit.parameters), Some(&written), groups);
-        run(&mut pass, &count, &arguments, None, None, [1, 1]);
-        pass
+        drop(pass);
+        self.fragment_parallel(unit, Some(&list))
     }
 
     fn hybrid_two_pass(&mut self, unit: &Unit<'_>) -> Result<(), GpuError> {

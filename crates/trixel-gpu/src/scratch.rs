@@ -13,6 +13,8 @@ pub(crate) struct Scratch {
     pub(crate) counters: wgpu::Buffer,
     /// Bound where a shader declares a buffer that it does not look at.
     pub(crate) nothing: wgpu::Buffer,
+    /// Arguments of a draw of one instance without vertices.
+    pub(crate) no_draw: wgpu::Buffer,
     status: Status,
     lists: Option<Lists>,
     scan: Option<ScanBuffers>,
@@ -79,7 +81,8 @@ fn holds(buffer: &wgpu::Buffer, elements: u32) -> bool {
 
 /// Arguments of a draw, then of a dispatch: `arguments.wgsl`.
 fn arguments(gpu: &Gpu) -> Result<wgpu::Buffer, GpuError> {
-    gpu.buffer("trixel arguments", 28, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT)
+    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_DST;
+    gpu.buffer("trixel arguments", 28, usage)
 }
 
 impl List {
@@ -120,6 +123,11 @@ impl Scratch {
         Ok(Self {
             counters: gpu.buffer("trixel counters", counters::BYTES, counters)?,
             nothing: gpu.buffer("trixel nothing", 4, wgpu::BufferUsages::STORAGE)?,
+            no_draw: gpu.buffer_with(
+                "trixel no draw",
+                bytemuck::cast_slice(&[0u32, 1, 0, 0]),
+                wgpu::BufferUsages::COPY_SRC,
+            )?,
             status: Status::new(gpu, 0, 0)?,
             lists: None,
             scan: None,

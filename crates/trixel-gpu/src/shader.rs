@@ -14,8 +14,9 @@ pub(crate) use shader;
 /// A step of a voxelization that has its own compute pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Stage {
-    /// All triangles, one invocation each; the hybrid defers those that are large by a heuristic.
-    TriangleParallel { defers: Option<Heuristic> },
+    /// All triangles, one invocation each; the hybrid defers those that are large by a heuristic to a draw of so many
+    /// vertices each.
+    TriangleParallel { defers: Option<(Heuristic, u32)> },
     /// Triangles of a list, one invocation each; all small, or a share of the columns of each.
     TriangleList { small: bool },
     /// Small and large triangles to two lists.
@@ -142,7 +143,9 @@ pub(crate) fn source(stage: Stage, variant: Variant, tier: Tier, max_groups: u32
     let mut constants = format!("const SMALL: bool = {small};\n");
     match stage {
         Stage::TriangleParallel { defers } => {
-            let (hybrid, heuristic) = (defers.is_some(), defers.unwrap_or_default().code());
+            let (heuristic, vertices) = defers.unwrap_or((Heuristic::default(), 1));
+            let (hybrid, heuristic) = (defers.is_some(), heuristic.code());
+            constants += &format!("const VERTICES: u32 = {vertices}u;\n");
             constants += &format!("const HYBRID: bool = {hybrid};\nconst HEURISTIC: u32 = {heuristic}u;\n");
         }
         Stage::Classify { heuristic } => constants += &format!("const HEURISTIC: u32 = {}u;\n", heuristic.code()),
@@ -235,7 +238,7 @@ mod tests {
             Stage::Arguments { vertices: 3 },
         ];
         for heuristic in Heuristic::ALL {
-            stages.push(Stage::TriangleParallel { defers: Some(heuristic) });
+            stages.push(Stage::TriangleParallel { defers: Some((heuristic, 15)) });
             stages.push(Stage::Classify { heuristic });
         }
         for stage in stages {

@@ -7,7 +7,7 @@ use crate::counters::{self, Counters};
 use crate::cutoff::{Cutoff, Dilation};
 use crate::error::GpuError;
 use crate::gpu::Gpu;
-use crate::limits::MAX_PAIRS;
+use crate::limits::{MAX_PAIRS, WORKGROUP};
 use crate::lists::{self, GpuVoxelList, ListMethod};
 use crate::mesh::GpuMesh;
 use crate::passes;
@@ -29,7 +29,9 @@ pub const STRATEGIES: [Strategy; 5] = [
 /// How to voxelize; nothing here changes which voxels are set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Options {
-    /// From which size on the hybrids call a triangle large; by default [`Cutoff::default_for`] the adapter.
+    /// From which size on the hybrids call a triangle large. By default [`Cutoff::default_for`] the adapter; the one-pass
+    /// hybrid then also gives meshes of fewer triangles than a workgroup has invocations to the rasterizer whole, because a
+    /// compute pass costs more than it could spare.
     pub cutoff: Option<Cutoff>,
     /// How triangles are dilated for the rasterizer.
     pub dilation: Dilation,
@@ -65,6 +67,8 @@ pub struct Voxelizer {
     strategy: Strategy,
     dilation: Dilation,
     cutoff: Cutoff,
+    /// Chunks of fewer triangles are not worth a pass of their own.
+    whole_below: u32,
     variant: Variant,
     scratch: Scratch,
     timer: Option<Timer>,
@@ -105,6 +109,7 @@ impl Voxelizer {
             strategy,
             dilation: options.dilation,
             cutoff: options.cutoff.unwrap_or_else(|| Cutoff::default_for(gpu.info(), Default::default())),
+            whole_below: if options.cutoff.is_none() { WORKGROUP } else { 0 },
             variant: Variant { mode: job.mode(), counting: options.count, sink: Sink::Bits },
             scratch: Scratch::new(gpu)?,
             timer: Timer::new(gpu)?,
@@ -178,6 +183,12 @@ impl Voxelizer {
     ) -> Result<(), GpuError> {
         let strategy = if classification.is_some() { Strategy::HybridTwoPass } else { self.strategy };
         let initial = self.cpu_part(mesh)?;
+        if strategy == Strategy::Hybrid && mesh.chunks.iter().any(|chunk| chunk.triangles < self.whole_below) {
+            // These do as that strategy does.
+            let Self { variant, dilation, cutoff, .. } = *self;
+            let strategy = Strategy::FragmentParallel;
+            probe::check(&self.gpu, probe::Checked { variant, strategy, heuristic: cutoff.heuristic, dilation })?;
+        }
         let gpu = self.gpu.clone();
         // One guard around everything: most of what is recorded is only checked by the driver much later.
         gpu.guarded(|| {
@@ -204,6 +215,7 @@ impl Voxelizer {
             variant: Variant { sink: appended.map_or(Sink::Bits, |(sink, _)| sink), ..self.variant },
             dilation: self.dilation,
             cutoff: self.cutoff,
+            whole_below: self.whole_below,
             mesh,
             volume,
             appended: appended.map(|(_, buffer)| buffer),

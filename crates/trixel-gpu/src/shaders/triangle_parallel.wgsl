@@ -4,6 +4,7 @@
 // triangle at a time, because some drivers end long loops silently; or, in the hybrid, the rasterizer takes it.
 
 @group(1) @binding(0) var<storage, read_write> list: array<u32>;
+// VERTICES times the list's length: 1 is prepended, or in the hybrid what makes this the vertex count of its draw.
 @group(1) @binding(1) var<storage, read_write> listed: atomic<u32>;
 
 @compute @workgroup_size(WORKGROUP)
@@ -21,7 +22,7 @@ fn triangle_parallel(
         return;
     }
     if !fits_one_invocation(look) || (HYBRID && size_of(look.shape) >= params.cutoff) {
-        list[atomicAdd(&listed, 1u)] = i;
+        list[atomicAdd(&listed, VERTICES) / VERTICES] = i;
         return;
     }
     voxelize_columns(triangle_of(look.shape), 0u);
