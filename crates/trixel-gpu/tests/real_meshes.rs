@@ -1,6 +1,6 @@
 //! Every strategy on real meshes and built-in scenes, against the CPU.
 //!
-//! By default a few at 64, on both drivers. `TRIXEL_GPU_PROOF=1` runs all sizes and strategies, for an hour.
+//! By default a few at 64, on both drivers. `TRIXEL_GPU_PROOF=1` runs all sizes, modes and strategies, for more than an hour.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a failure here is a failed test")]
 
