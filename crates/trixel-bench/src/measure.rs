@@ -173,7 +173,7 @@ impl Bench<'_> {
                 let options = Options { cutoff, count: true, ..Options::default() };
                 let mut counting = Voxelizer::new(gpu, &self.job.with_strategy(strategy), &options)?;
                 counting.run(&mesh, &volume)?;
-                cell.counters = Some(counting.check()?.into());
+                cell.counters = Some(counting.check()?);
             }
             results.cells.push(cell);
         }

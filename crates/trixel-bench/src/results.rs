@@ -1,6 +1,7 @@
 //! What was measured, as it is stored.
 
 use serde::{Deserialize, Serialize};
+use trixel_gpu::Counters;
 
 /// The version of the stored form; a change that old readers would misread raises it.
 pub const SCHEMA: u32 = 1;
@@ -81,39 +82,6 @@ pub struct Cell {
     pub voxels: u64,
     /// Voxels that differ from the CPU's.
     pub wrong_voxels: u64,
-}
-
-/// [`trixel_gpu::Counters`], as stored.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct Counters {
-    /// Compute invocations that had something to look at.
-    pub invocations: u64,
-    /// Fragments shaded.
-    pub fragments: u64,
-    /// Fragments that set no voxel.
-    pub fragments_discarded: u64,
-    /// Columns of triangles tested.
-    pub columns: u64,
-    /// Voxels tested.
-    pub voxel_tests: u64,
-    /// Voxels written.
-    pub voxels_written: u64,
-    /// Atomic operations.
-    pub atomics: u64,
-}
-
-impl From<trixel_gpu::Counters> for Counters {
-    fn from(counted: trixel_gpu::Counters) -> Self {
-        Self {
-            invocations: counted.invocations,
-            fragments: counted.fragments,
-            fragments_discarded: counted.fragments_discarded,
-            columns: counted.columns,
-            voxel_tests: counted.voxel_tests,
-            voxels_written: counted.voxels_written,
-            atomics: counted.atomics,
-        }
-    }
 }
 
 /// The hybrid's time over its cutoff.

@@ -5,12 +5,14 @@ use std::time::Instant;
 use anyhow::Result;
 use trixel::lattice::LatticeMesh;
 use trixel::{Backend, CpuBackend, Job, Strategy, Volume};
-use trixel_gpu::{AdapterChoice, Cutoff, Gpu, GpuError, GpuMesh, GpuVolume, Heuristic, Options, STRATEGIES, Voxelizer};
+use trixel_gpu::{
+    AdapterChoice, Counters, Cutoff, Gpu, GpuError, GpuMesh, GpuVolume, Heuristic, Options, STRATEGIES, Voxelizer,
+};
 
 use crate::args::{BackendArg, MethodArgs};
 use crate::grid::usage;
 use crate::progress::Reporter;
-use crate::report::{AdapterReport, CountersReport, CutoffReport};
+use crate::report::{AdapterReport, CutoffReport};
 use crate::tuned;
 
 /// An open backend.
@@ -29,7 +31,7 @@ pub(crate) struct Ran {
     pub(crate) backend: &'static str,
     pub(crate) strategy: Strategy,
     pub(crate) adapter: Option<AdapterReport>,
-    pub(crate) counters: Option<CountersReport>,
+    pub(crate) counters: Option<Counters>,
     pub(crate) cutoff: Option<CutoffReport>,
     pub(crate) passes_ms: Vec<(&'static str, f64)>,
     pub(crate) check_ms: Option<f64>,
@@ -185,7 +187,7 @@ fn run_on_gpu(
         ran?;
         samples_ms.push(ms);
     }
-    let counters = if options.count { Some(voxelizer.check()?.into()) } else { None };
+    let counters = if options.count { Some(voxelizer.check()?) } else { None };
     let passes_ms = voxelizer.pass_times()?.iter().map(|pass| (pass.name, pass.ms)).collect();
     let start = Instant::now();
     voxels.download(gpu, volume)?;

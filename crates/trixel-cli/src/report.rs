@@ -26,7 +26,7 @@ pub(crate) struct Report {
     pub(crate) stages_ms: Stages,
     pub(crate) samples_ms: Samples,
     /// What the shaders counted, if asked to.
-    pub(crate) counters: Option<CountersReport>,
+    pub(crate) counters: Option<Counters>,
     /// The hybrids' cutoff.
     pub(crate) cutoff: Option<CutoffReport>,
     /// Milliseconds of each pass of the last run on the device, where it has timestamps.
@@ -116,26 +116,6 @@ impl From<&VoxelAttributes> for AttributesReport {
             bytes: attributes.bytes(),
             bytes_per_voxel,
         }
-    }
-}
-
-/// [`Counters`] in a report.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub(crate) struct CountersReport {
-    invocations: u64,
-    fragments: u64,
-    fragments_discarded: u64,
-    columns: u64,
-    voxel_tests: u64,
-    voxels_written: u64,
-    atomics: u64,
-}
-
-impl From<Counters> for CountersReport {
-    fn from(counters: Counters) -> Self {
-        let Counters { invocations, fragments, fragments_discarded, columns, voxel_tests, voxels_written, atomics } =
-            counters;
-        Self { invocations, fragments, fragments_discarded, columns, voxel_tests, voxels_written, atomics }
     }
 }
 

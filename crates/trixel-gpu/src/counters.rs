@@ -2,6 +2,7 @@
 
 /// Counts over one voxelization, exact on every driver: the shaders add to a buffer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Counters {
     /// Compute invocations that had something to look at.
     pub invocations: u64,
