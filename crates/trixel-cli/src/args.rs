@@ -9,6 +9,8 @@ use trixel::attributes::{AttributeKind, Combine};
 use trixel::{Grid, Job, Mode, Strategy, UpAxis};
 use trixel_gpu::{Dilation, Heuristic};
 
+use crate::render_args::{RENDER_EXAMPLES, RenderArgs};
+
 const STYLES: Styles = Styles::styled()
     .header(AnsiColor::Yellow.on_default().bold())
     .usage(AnsiColor::Yellow.on_default().bold())
@@ -37,6 +39,11 @@ pub(crate) enum Command {
     ///
     /// Exits with status 1 if any voxel differs.
     Verify(VerifyArgs),
+    /// Take a picture of light that passes through a mesh: refraction, transmittance, transparent shadow.
+    ///
+    /// The effects of Chang and Lai 2011, section 3, computed from voxels on a GPU; or traced, with --reference.
+    #[command(after_help = RENDER_EXAMPLES)]
+    Render(Box<RenderArgs>),
     /// Find the cutoff at which the hybrid strategy is fastest on this machine's GPU, and store it for later runs.
     ///
     /// Searches by golden section on the mesh and grid given, prints what it measured beside the two pure strategies, and

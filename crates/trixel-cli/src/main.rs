@@ -10,6 +10,8 @@ mod memory;
 mod mesh;
 mod out_of_core;
 mod progress;
+mod render;
+mod render_args;
 mod report;
 mod tune;
 mod tuned;
@@ -30,6 +32,7 @@ fn main() -> ExitCode {
         Command::Voxelize(args) => voxelize::run(*args),
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Render(args) => render::run(&args),
         Command::Tune(args) => tune::run(args),
         Command::Bench(args) => bench::run(&args),
         Command::Completions { shell } => {

@@ -113,7 +113,10 @@ impl Gpu {
     }
 
     /// Runs what may exhaust memory or be refused, and turns that into an error.
-    pub(crate) fn guarded<T>(&self, run: impl FnOnce() -> T) -> Result<T, GpuError> {
+    ///
+    /// # Errors
+    /// What the device said meanwhile.
+    pub fn guarded<T>(&self, run: impl FnOnce() -> T) -> Result<T, GpuError> {
         let internal = self.device().push_error_scope(wgpu::ErrorFilter::Internal);
         let validation = self.device().push_error_scope(wgpu::ErrorFilter::Validation);
         let memory = self.device().push_error_scope(wgpu::ErrorFilter::OutOfMemory);
@@ -153,13 +156,11 @@ impl Gpu {
         polled.map(drop).map_err(|error| self.refused(&error))
     }
 
-    /// Reads the first bytes of a buffer that allows mapping.
-    pub(crate) fn read<T>(
-        &self,
-        buffer: &wgpu::Buffer,
-        bytes: u64,
-        take: impl FnOnce(&[u8]) -> T,
-    ) -> Result<T, GpuError> {
+    /// Waits for everything submitted, and reads the first bytes of a buffer that allows mapping.
+    ///
+    /// # Errors
+    /// When the device was lost, or refuses.
+    pub fn read<T>(&self, buffer: &wgpu::Buffer, bytes: u64, take: impl FnOnce(&[u8]) -> T) -> Result<T, GpuError> {
         if bytes == 0 {
             return Ok(take(&[]));
         }
@@ -188,7 +189,10 @@ impl Gpu {
     }
 
     /// A buffer, or an error when there is no memory for it.
-    pub(crate) fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, GpuError> {
+    ///
+    /// # Errors
+    /// When memory runs out, or the device refuses.
+    pub fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, GpuError> {
         // Zero-sized bindings are refused by wgpu.
         let size = bytes.next_multiple_of(4).max(4);
         self.guarded(|| {
@@ -217,7 +221,10 @@ impl Gpu {
     }
 
     /// A buffer with contents.
-    pub(crate) fn buffer_with(
+    ///
+    /// # Errors
+    /// When memory runs out, or the device refuses.
+    pub fn buffer_with(
         &self,
         label: &str,
         contents: &[u8],

@@ -1,5 +1,6 @@
-//! Pictures of voxel volumes.
+//! Pictures of voxel volumes, and of light that passes through them.
 
+pub mod light;
 mod picture;
 mod preview;
 

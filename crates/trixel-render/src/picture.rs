@@ -13,10 +13,13 @@ pub struct Picture {
     pub rgba: Vec<u8>,
 }
 
-/// Why a picture could not be written.
+/// Why a picture could not be written or read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PictureError {
+    /// The file is no picture, or too large a one.
+    #[error("reading a picture failed: {0}")]
+    Decode(#[from] image::ImageError),
     /// `rgba` does not hold four bytes for each pixel.
     #[error("a picture of {width} x {height} pixels needs {needed} bytes of RGBA, but has {found}")]
     Length {
@@ -43,6 +46,15 @@ impl Picture {
         }
         let start = (y as usize * self.width as usize + x as usize) * 4;
         self.rgba.get(start..start + 4)?.try_into().ok()
+    }
+
+    /// Reads a PNG file of at most 8192 x 8192 pixels.
+    ///
+    /// # Errors
+    /// When it is damaged or too large.
+    pub fn decode_png(bytes: &[u8]) -> Result<Self, PictureError> {
+        let rgba = decode(bytes, Some(image::ImageFormat::Png))?.into_rgba8();
+        Ok(Self { width: rgba.width(), height: rgba.height(), rgba: rgba.into_raw() })
     }
 
     /// Writes the picture as a PNG file, tagged as sRGB; without an alpha channel when every pixel is opaque.
@@ -78,6 +90,26 @@ impl Picture {
         writer.finish()?;
         Ok(())
     }
+}
+
+/// Decodes an image file of at most 8192 x 8192 pixels, of a format or of the one that its first bytes say.
+pub(crate) fn decode(
+    bytes: &[u8],
+    format: Option<image::ImageFormat>,
+) -> Result<image::DynamicImage, image::ImageError> {
+    const MOST_SIDE: u32 = 8192;
+    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes));
+    match format {
+        Some(format) => reader.set_format(format),
+        None => reader = reader.with_guessed_format()?,
+    }
+    let mut limits = image::Limits::default();
+    limits.max_image_width = Some(MOST_SIDE);
+    limits.max_image_height = Some(MOST_SIDE);
+    // 16 bytes a pixel.
+    limits.max_alloc = Some(1 << 31);
+    reader.limits(limits);
+    reader.decode()
 }
 
 /// The linear light of an 8-bit sRGB value (IEC 61966-2-1).
