@@ -80,6 +80,11 @@ impl Grid {
         Ok(grid)
     }
 
+    /// Unit voxels at the origin; `dims` are in range.
+    pub(crate) fn of_units(dims: [u32; 3]) -> Self {
+        Self { origin: [0.0; 3], voxel_size: [1.0; 3], dims }
+    }
+
     /// Cubic voxels fitted to `bounds`: exactly `resolution` along the longest side, and along the other sides the
     /// fewest that cover the box (as snapped to the lattice, so an equal side gets an equal count).
     ///

@@ -37,6 +37,7 @@ mod bricks;
 #[cfg(any(test, feature = "conformance"))]
 pub mod conformance;
 mod cpu;
+mod frame;
 mod grid;
 mod job;
 pub mod lattice;
@@ -52,6 +53,7 @@ mod volume;
 pub use backend::{Backend, Error, voxelize};
 pub use bricks::{BrickMap, Occupancy};
 pub use cpu::{BinnedMesh, CpuBackend, Instructions, ThreadsError};
+pub use frame::{Frame, FrameError, FramedMesh};
 pub use grid::{Grid, GridError};
 pub use job::{Job, JobError, Strategy};
 pub use material::{AlphaMode, Filter, Image, ImageSource, Material, Texture, TextureRef, Wrap};
