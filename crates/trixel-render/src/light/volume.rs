@@ -218,13 +218,13 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "small")]
     fn normals_point_outwards_and_distances_do_not_reach_the_surface() {
         let options = LightOptions { resolution: 20, ..LightOptions::default() };
         let sphere = volume("sphere:32", &options);
         let [nx, ny, _] = sphere.dims.map(|n| n as usize);
         for (i, texel) in sphere.surface.iter().enumerate() {
             let place = [i % nx, i / nx % ny, i / nx / ny];
-            #[expect(clippy::cast_precision_loss, reason = "small")]
             let p = Vec3::from_array(std::array::from_fn(|axis| {
                 (sphere.origin[axis] + (place[axis] as f64 + 0.5) * sphere.voxel) as f32
             }));
