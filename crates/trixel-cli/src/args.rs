@@ -9,7 +9,7 @@ use trixel::attributes::{AttributeKind, Combine};
 use trixel::{Grid, Job, Mode, Strategy, UpAxis};
 use trixel_gpu::{Dilation, Heuristic};
 
-use crate::render_args::{RENDER_EXAMPLES, RenderArgs};
+use crate::render_args::{ANIMATE_EXAMPLES, AnimateArgs, RENDER_EXAMPLES, RenderArgs};
 
 const STYLES: Styles = Styles::styled()
     .header(AnsiColor::Yellow.on_default().bold())
@@ -44,6 +44,11 @@ pub(crate) enum Command {
     /// The effects of Chang and Lai 2011, section 3, computed from voxels on a GPU; or traced, with --reference.
     #[command(after_help = RENDER_EXAMPLES)]
     Render(Box<RenderArgs>),
+    /// Make a film of light through a mesh that deforms, voxelized anew for every frame.
+    ///
+    /// Skinned and morphed glTF plays its animation; other meshes are walked round. Takes the effects of `render`.
+    #[command(after_help = ANIMATE_EXAMPLES)]
+    Animate(Box<AnimateArgs>),
     /// Find the cutoff at which the hybrid strategy is fastest on this machine's GPU, and store it for later runs.
     ///
     /// Searches by golden section on the mesh and grid given, prints what it measured beside the two pure strategies, and

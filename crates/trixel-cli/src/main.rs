@@ -1,5 +1,6 @@
 //! The `trixel` command.
 
+mod animate;
 mod args;
 mod attributes;
 mod bench;
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Render(args) => render::run(&args),
+        Command::Animate(args) => animate::run(&args),
         Command::Tune(args) => tune::run(args),
         Command::Bench(args) => bench::run(&args),
         Command::Completions { shell } => {

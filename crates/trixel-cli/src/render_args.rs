@@ -19,6 +19,14 @@ Examples:
 
 Exit status: 0 done, 1 failed, 2 wrong usage.";
 
+pub(crate) const ANIMATE_EXAMPLES: &str = "\
+Examples:
+  trixel animate CesiumMan.glb --effect refraction --frames 48 -o glass.gif
+  trixel animate scene:knot --effect transmittance --material 1.3:6,2,6 --frames 60 -o knot.apng
+  trixel animate horse.obj --turn 90 --frames 12 -o frames/
+
+Exit status: 0 done, 1 failed, 2 wrong usage.";
+
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
     /// A mesh file, or scene:NAME or scene:NAME:N; several make one scene, in which later ones lie inside earlier ones.
@@ -43,6 +51,49 @@ pub(crate) struct RenderArgs {
     /// Say nothing but errors.
     #[arg(short, long)]
     pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct AnimateArgs {
+    /// A glTF or GLB file with skins or morph targets, which is voxelized anew for every frame; or any mesh, or scene:NAME.
+    #[arg(value_name = "INPUT")]
+    pub(crate) input: String,
+
+    /// Write the film here: .gif, .apng or .png (animated); or FOLDER/ for one .png a frame.
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: PathBuf,
+
+    /// How many pictures.
+    #[arg(short = 'n', long, value_name = "N", default_value = "48", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub(crate) frames: u32,
+
+    /// The animation to play, by its name or its number from 0; by default the first.
+    #[arg(short, long, value_name = "NAME|NUMBER")]
+    pub(crate) animation: Option<String>,
+
+    /// How long the film is; by default as long as the animation, or 4 seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    pub(crate) seconds: Option<f64>,
+
+    /// Walk round the object by so much while the film runs; by default 360 where nothing else moves.
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    pub(crate) turn: Option<f64>,
+
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+
+    /// Write the times of every frame and their medians here, as JSON.
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) report: Option<PathBuf>,
+
+    /// Say nothing but errors.
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|seconds| (0.02..=600.0).contains(seconds));
+    seconds.ok_or_else(|| "a film takes 0.02 to 600 seconds".to_owned())
 }
 
 /// How a picture of light is taken.

@@ -2,6 +2,7 @@
 //!
 //! - [`read::read_mesh`] reads a mesh, with materials and what else shades it; the extension or the first bytes pick the
 //!   reader.
+//! - [`animation::read_animated`] reads a mesh that deforms: skins, morph targets and animations of glTF.
 //! - [`textures::decode_textures`] decodes the images that materials name, when colours are wanted.
 //! - [`write::write_volume`] writes a volume in the format that the extension names; the table in [`mod@write`] says what
 //!   each format keeps.
@@ -36,6 +37,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod animation;
 pub mod atomic_file;
 mod bits;
 mod extension;

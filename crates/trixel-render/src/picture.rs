@@ -32,6 +32,19 @@ pub enum PictureError {
         /// Bytes that there are.
         found: usize,
     },
+    /// A film without frames, or of a size that no format holds.
+    #[error("a film of {frames} frames of {width} x {height} pixels cannot be written; a side takes 1 to 65535")]
+    Film {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+        /// Frames, or those still missing.
+        frames: u32,
+    },
+    /// The GIF encoder or its output failed.
+    #[error("writing a GIF failed: {0}")]
+    Gif(#[from] gif::EncodingError),
     /// The encoder or the output failed.
     #[error("writing a PNG picture failed: {0}")]
     Encode(#[from] png::EncodingError),

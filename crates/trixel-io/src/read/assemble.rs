@@ -69,6 +69,15 @@ pub(super) struct Part {
     pub(super) materials: Vec<u32>,
 }
 
+/// Where a placed part begins in the mesh.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    /// Its first vertex.
+    pub(super) vertex: usize,
+    /// Its first value of the normals.
+    pub(super) normal: usize,
+}
+
 /// Collects placed parts.
 #[derive(Debug)]
 pub(super) struct Assembly {
@@ -95,14 +104,14 @@ impl Assembly {
         }
     }
 
-    /// Adds `part`, moved by `transform`. Mirrored triangles are turned round, so that outward stays outward.
-    /// `material` translates the part's materials to those of the mesh.
+    /// Adds `part`, moved by `transform`, and says where its vertices and values begin. Mirrored triangles are turned round,
+    /// so that outward stays outward. `material` translates the part's materials to those of the mesh.
     pub(super) fn place(
         &mut self,
         part: &Part,
         transform: &Affine,
         material: impl Fn(u32) -> u32,
-    ) -> Result<(), Problem> {
+    ) -> Result<Start, Problem> {
         self.vertices.take(&part.name, part.positions.len())?;
         self.triangles.take(&part.name, part.triangles.len())?;
         for values in [
@@ -114,6 +123,7 @@ impl Assembly {
         }
         let first_vertex = self.mesh.positions.len();
         let first_triangle = self.mesh.triangles.len();
+        let start = Start { vertex: first_vertex, normal: self.normals.values.len() };
         let flip = transform.determinant() < 0.0;
 
         self.mesh.positions.extend(part.positions.iter().map(|&p| transform.point(p)));
@@ -135,7 +145,7 @@ impl Assembly {
             self.mesh.triangle_materials.resize(first_triangle, Mesh::NO_MATERIAL);
             self.mesh.triangle_materials.extend(part.materials.iter().map(|&m| material(m)));
         }
-        Ok(())
+        Ok(start)
     }
 
     /// The mesh of all that was placed.
@@ -281,7 +291,7 @@ fn index(i: usize) -> u32 {
     u32::try_from(i).unwrap_or(u32::MAX)
 }
 
-fn unit_normal(matrix: &[[f64; 3]; 3], normal: [f32; 3]) -> [f32; 3] {
+pub(super) fn unit_normal(matrix: &[[f64; 3]; 3], normal: [f32; 3]) -> [f32; 3] {
     let n = normal.map(f64::from);
     let mapped = matrix.map(|row| row[0] * n[0] + row[1] * n[1] + row[2] * n[2]);
     // Divided by the largest first, so that squares of tiny or huge scales stay in range.

@@ -20,7 +20,7 @@ mod assemble;
 mod collada;
 pub(crate) mod color;
 mod directory;
-mod gltf;
+pub(crate) mod gltf;
 mod instances;
 mod mtl;
 mod obj;
@@ -291,11 +291,25 @@ fn read_bytes(
         MeshFormat::Collada => collada::read,
     };
     let loaded = read(bytes, options, resources).map_err(|problem| damaged(path, problem))?;
+    check_loaded(path, &loaded)?;
+    Ok(loaded)
+}
+
+/// Reads glTF with what moves it.
+pub(crate) fn read_gltf_animated(path: &Path, options: &ReadOptions) -> Result<(Loaded, gltf::Rig), ReadError> {
+    let bytes = load(path).map_err(|source| ReadError::Io { path: path.to_owned(), source })?;
+    let read = gltf::read_animated(&bytes, options, &directory::Directory::of(path));
+    let (loaded, rig) = read.map_err(|problem| damaged(path, problem))?;
+    check_loaded(path, &loaded)?;
+    Ok((loaded, rig))
+}
+
+/// Holds what a reader returned to what this module promises.
+fn check_loaded(path: &Path, loaded: &Loaded) -> Result<(), ReadError> {
     if loaded.mesh.triangles.is_empty() {
         return Err(ReadError::Empty { path: path.to_owned() });
     }
-    check(&loaded.mesh).map_err(|error| damaged(path, problem_of(&error)))?;
-    Ok(loaded)
+    check(&loaded.mesh).map_err(|error| damaged(path, problem_of(&error)))
 }
 
 /// Warns of things by name, of many only of the first few.

@@ -41,6 +41,14 @@ impl Builder {
         self.mesh.materials.push(Material { name, base_color: [r, g, b, 1.0], roughness, ..Material::default() });
     }
 
+    /// What follows has a new material that light passes through: a name, a linear colour, and an index of refraction.
+    pub(super) fn clear_material(&mut self, name: &str, color: [f32; 3], index_of_refraction: f32) {
+        self.material(name, color, 0.0);
+        if let Some(material) = self.mesh.materials.last_mut() {
+            (material.index_of_refraction, material.transmission) = (index_of_refraction, 1.0);
+        }
+    }
+
     /// What follows has a material made before, counted from 0.
     pub(super) fn use_material(&mut self, material: u32) {
         self.material = material;

@@ -8,6 +8,7 @@ mod builder;
 mod city;
 mod cube;
 mod hairball;
+mod knot;
 mod numbers;
 mod room;
 mod sphere;
@@ -38,7 +39,7 @@ pub struct Scene {
 }
 
 /// Every built-in scene.
-pub const SCENES: [Scene; 9] = [
+pub const SCENES: [Scene; 11] = [
     cube::SCENE,
     torus::SCENE,
     sphere::SCENE,
@@ -48,6 +49,8 @@ pub const SCENES: [Scene; 9] = [
     hairball::SCENE,
     city::SCENE,
     tree::SCENE,
+    knot::SCENE,
+    knot::IN_A_BALL,
 ];
 
 /// Why a scene could not be built.

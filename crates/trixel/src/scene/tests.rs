@@ -72,7 +72,7 @@ fn scenes_are_the_same_to_the_last_bit_as_when_they_were_made() {
         bits.fold(0xcbf2_9ce4_8422_2325_u64, |hash, b| (hash ^ b).wrapping_mul(0x100_0000_01b3))
     };
     let found = SCENES.map(|scene| (scene.name, digest(&scene)));
-    let expected: [(&str, u64); 9] = [
+    let expected: [(&str, u64); 11] = [
         ("cube", 1_881_318_220_277_171_133),
         ("torus", 16604716844640175554),
         ("sphere", 12250887416807254099),
@@ -82,6 +82,8 @@ fn scenes_are_the_same_to_the_last_bit_as_when_they_were_made() {
         ("hairball", 2797405507819153496),
         ("city", 4603737948459794725),
         ("tree", 13993009417708168021),
+        ("knot", 7741018775427879933),
+        ("glass-ball", 6334335377080578844),
     ];
     assert_eq!(found.as_slice(), expected.as_slice());
 }
@@ -100,6 +102,9 @@ fn closed_scenes_are_closed_and_face_outwards() {
         ("sphere:1", tau * 2.0 / 3.0, 0.5),
         ("sphere:2", tau * 2.0 / 3.0, 0.2),
         ("sphere:64", tau * 2.0 / 3.0, 3e-4),
+        // The length of the curve times the tube's section.
+        ("knot", 1.0689, 3e-3),
+        ("glass-ball", tau * 2.0 / 3.0 + 0.512 * 1.0689, 5e-3),
     ] {
         let mesh = build(spec).unwrap();
         assert!(is_closed(&mesh.triangles), "{spec}");
@@ -188,7 +193,8 @@ fn strands_of_the_hairball_are_open_tubes_near_the_sphere() {
 #[test]
 fn errors_say_what_to_do() {
     let message = |spec: &str| build(spec).unwrap_err().to_string();
-    let names = "the scenes are cube, torus, sphere, triangle, room, room-rotated, hairball, city, tree";
+    let names = "the scenes are cube, torus, sphere, triangle, room, room-rotated, hairball, city, tree, knot, \
+                 glass-ball";
     assert_eq!(message("tours"), format!("there is no scene 'tours'; did you mean 'torus'?; {names}"));
     assert_eq!(message("Sphere"), format!("there is no scene 'Sphere'; did you mean 'sphere'?; {names}"));
     assert_eq!(message("dragon"), format!("there is no scene 'dragon'; {names}"));

@@ -208,7 +208,7 @@ impl<'d> SceneReader<'d> {
             _ => Rc::new(Vec::new()),
         };
         let material = |symbol: u32| bound.get(symbol as usize).copied().unwrap_or(Mesh::NO_MATERIAL);
-        self.assembly.place(&read.part, transform, material)
+        self.assembly.place(&read.part, transform, material).map(|_| ())
     }
 
     /// The material of each symbol, as an instance binds them; an unbound symbol may itself be a material's id.

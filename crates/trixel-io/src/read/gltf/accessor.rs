@@ -61,16 +61,20 @@ impl Accessors<'_> {
         Ok(self.get(index)?.0.buffer_view.is_some())
     }
 
-    /// The elements of a `VEC2`, `VEC3` or `VEC4` accessor, normalized integers mapped to -1..1 or 0..1.
+    /// The elements of a `SCALAR`, `VEC2`, `VEC3`, `VEC4` or `MAT4` accessor, normalized integers mapped to -1..1 or 0..1.
     pub(super) fn vectors<const N: usize>(&self, index: usize, budget: &mut Budget) -> Result<Vec<[f64; N]>, Problem> {
         let (accessor, at) = self.get(index)?;
-        let kind = format!("VEC{N}");
+        let kind = match N {
+            1 => "SCALAR".to_owned(),
+            16 => "MAT4".to_owned(),
+            _ => format!("VEC{N}"),
+        };
         if accessor.kind != kind {
             return Err(Problem::new(at, format!("is of type {} where {kind} is needed", accessor.kind)));
         }
         let component = Component::from_code(accessor.component_type, &at)?;
         if component == Component::U32 {
-            return Err(Problem::new(at, "has component type 5125, which vertices cannot have"));
+            return Err(Problem::new(at, "has component type 5125, which only indices may have"));
         }
         budget.take(&at, accessor.count)?;
         let size = N * component.size();

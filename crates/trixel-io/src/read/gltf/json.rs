@@ -35,6 +35,10 @@ pub(super) struct Document<'a> {
     pub(super) images: Vec<Image<'a>>,
     #[serde(default)]
     pub(super) samplers: Vec<Sampler>,
+    #[serde(default)]
+    pub(super) skins: Vec<Skin>,
+    #[serde(default, borrow)]
+    pub(super) animations: Vec<Animation<'a>>,
 }
 
 #[derive(Deserialize)]
@@ -56,6 +60,7 @@ pub(super) struct Node<'a> {
     #[serde(default)]
     pub(super) children: Vec<usize>,
     pub(super) mesh: Option<usize>,
+    pub(super) skin: Option<usize>,
     pub(super) matrix: Option<[f64; 16]>,
     pub(super) translation: Option<[f64; 3]>,
     pub(super) rotation: Option<[f64; 4]>,
@@ -128,6 +133,10 @@ pub(super) struct Attributes {
     pub(super) texcoord_1: Option<usize>,
     pub(super) texcoord_2: Option<usize>,
     pub(super) texcoord_3: Option<usize>,
+    pub(super) joints_0: Option<usize>,
+    pub(super) joints_1: Option<usize>,
+    pub(super) weights_0: Option<usize>,
+    pub(super) weights_1: Option<usize>,
 }
 
 #[derive(Deserialize, Clone, PartialEq, Eq, Hash)]
@@ -329,6 +338,45 @@ pub(super) struct Sampler {
     pub(super) min_filter: Option<u32>,
     pub(super) wrap_s: Option<u32>,
     pub(super) wrap_t: Option<u32>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Skin {
+    pub(super) inverse_bind_matrices: Option<usize>,
+    pub(super) joints: Vec<usize>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Animation<'a> {
+    #[serde(default, borrow)]
+    pub(super) name: Cow<'a, str>,
+    #[serde(default, borrow)]
+    pub(super) channels: Vec<Channel<'a>>,
+    #[serde(default, borrow)]
+    pub(super) samplers: Vec<AnimationSampler<'a>>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Channel<'a> {
+    pub(super) sampler: usize,
+    #[serde(borrow)]
+    pub(super) target: ChannelTarget<'a>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct ChannelTarget<'a> {
+    pub(super) node: Option<usize>,
+    #[serde(borrow)]
+    pub(super) path: Cow<'a, str>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct AnimationSampler<'a> {
+    pub(super) input: usize,
+    pub(super) output: usize,
+    #[serde(default, borrow)]
+    pub(super) interpolation: Cow<'a, str>,
 }
 
 /// Text that is borrowed from the JSON where it can be: data URIs are most of many files.

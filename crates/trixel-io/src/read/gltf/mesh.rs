@@ -10,6 +10,21 @@ use crate::numbers::narrow;
 use crate::read::Problem;
 use crate::read::assemble::{Budget, Part};
 
+/// What deforms the vertices of a part.
+#[derive(Debug, Default)]
+pub(super) struct Deformers {
+    pub(super) targets: Vec<MorphTarget>,
+    /// Joints of the skin that move each vertex, with their weights; empty if none does.
+    pub(super) influences: Vec<Vec<(u16, f64)>>,
+}
+
+/// How far a morph target moves each vertex; empty where it does not.
+#[derive(Debug)]
+pub(super) struct MorphTarget {
+    pub(super) positions: Vec<[f64; 3]>,
+    pub(super) normals: Vec<[f64; 3]>,
+}
+
 /// Decodes meshes, and counts what it leaves out.
 pub(super) struct Meshes<'a> {
     pub(super) accessors: Accessors<'a>,
@@ -28,12 +43,30 @@ impl<'a> Meshes<'a> {
 
     /// The parts of mesh `index`, deformed by its morph targets as far as `weights` (or else the mesh's own) say.
     pub(super) fn parts(&mut self, index: usize, weights: &[f64]) -> Result<Vec<Part>, Problem> {
+        let own = self.accessors.document.meshes.get(index).map_or(&[][..], |mesh| &mesh.weights);
+        let weights = if weights.is_empty() { own } else { weights };
+        Ok(self.primitives(index, weights)?.into_iter().map(|(part, _)| part).collect())
+    }
+
+    /// The parts of mesh `index` as no morph target deforms them, and what deforms each.
+    pub(super) fn deformable_parts(&mut self, index: usize) -> Result<Vec<(Part, Deformers)>, Problem> {
+        let parts = self.primitives(index, &[])?;
+        parts
+            .into_iter()
+            .map(|(part, primitive)| {
+                let deformers = self.deformers(primitive, &part)?;
+                Ok((part, deformers))
+            })
+            .collect()
+    }
+
+    /// The parts of mesh `index`, each with the first primitive that it is made of.
+    fn primitives(&mut self, index: usize, weights: &[f64]) -> Result<Vec<(Part, &'a Primitive)>, Problem> {
         let Some(mesh) = self.accessors.document.meshes.get(index) else {
             return Err(Problem::new(format!("mesh {index}"), "does not exist, but a node names it"));
         };
         let at = if mesh.name.is_empty() { format!("mesh {index}") } else { format!("mesh {index} ({})", mesh.name) };
-        let weights = if weights.is_empty() { &mesh.weights } else { weights };
-        let mut parts: Vec<Part> = Vec::new();
+        let mut parts: Vec<(Part, &Primitive)> = Vec::new();
         let mut by_vertices: HashMap<(&Attributes, &[Target]), usize> = HashMap::new();
         for (i, primitive) in mesh.primitives.iter().enumerate() {
             let at = format!("{at}, primitive {i}");
@@ -61,15 +94,15 @@ impl<'a> Meshes<'a> {
                 Some(&part) => part,
                 None => {
                     by_vertices.insert(key, parts.len());
-                    parts.push(self.vertices(primitive, position, weights, &at)?);
+                    parts.push((self.vertices(primitive, position, weights, &at)?, primitive));
                     parts.len() - 1
                 }
             };
-            if let Some(part) = parts.get_mut(part) {
+            if let Some((part, _)) = parts.get_mut(part) {
                 self.triangles(primitive, part, &at)?;
             }
         }
-        parts.retain(|part| !part.triangles.is_empty());
+        parts.retain(|(part, _)| !part.triangles.is_empty());
         Ok(parts)
     }
 
@@ -137,6 +170,33 @@ impl<'a> Meshes<'a> {
         Ok(part)
     }
 
+    fn deformers(&mut self, primitive: &Primitive, part: &Part) -> Result<Deformers, Problem> {
+        let (at, vertices) = (part.name.as_str(), part.positions.len());
+        let mut deformers = Deformers::default();
+        for target in &primitive.targets {
+            let mut offsets = |accessor: Option<usize>| {
+                accessor
+                    .map_or(Ok(Vec::new()), |accessor| self.attribute::<3>(accessor, "a morph target", vertices, at))
+            };
+            let positions = offsets(target.position)?;
+            let normals = if part.normals.is_some() { offsets(target.normal)? } else { Vec::new() };
+            deformers.targets.push(MorphTarget { positions, normals });
+        }
+        let names = &primitive.attributes;
+        for (joints, weights) in [(names.joints_0, names.weights_0), (names.joints_1, names.weights_1)] {
+            let (Some(joints), Some(weights)) = (joints, weights) else { continue };
+            let joints = self.attribute::<4>(joints, "JOINTS", vertices, at)?;
+            let weights = self.attribute::<4>(weights, "WEIGHTS", vertices, at)?;
+            deformers.influences.resize(vertices, Vec::new());
+            for ((influences, joints), weights) in deformers.influences.iter_mut().zip(joints).zip(weights) {
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 16 bits")]
+                let pairs = joints.into_iter().zip(weights).map(|(joint, weight)| (joint as u16, weight));
+                influences.extend(pairs.filter(|(_, weight)| *weight > 0.0));
+            }
+        }
+        Ok(deformers)
+    }
+
     /// An attribute that must have one value a vertex.
     fn attribute<const N: usize>(
         &mut self,
@@ -198,7 +258,7 @@ impl<'a> Meshes<'a> {
     }
 }
 
-fn add_weighted(values: &mut [[f64; 3]], offsets: &[[f64; 3]], weight: f64) {
+pub(super) fn add_weighted(values: &mut [[f64; 3]], offsets: &[[f64; 3]], weight: f64) {
     for (value, offset) in values.iter_mut().zip(offsets) {
         for (v, o) in value.iter_mut().zip(offset) {
             *v += weight * o;

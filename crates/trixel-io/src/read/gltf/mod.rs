@@ -1,13 +1,16 @@
 //! glTF 2.0, JSON and binary (GLB), after the Khronos specification of 2021.
 //!
 //! The default scene is read, with the transforms of its nodes composed in `f64`. Skinned meshes are read as they lie in
-//! their node, without their skin; morph targets by their default weights. Cameras, lights and animations are ignored.
+//! their node, without their skin; morph targets by their default weights. Cameras and lights are ignored. Skins and
+//! animations are what [`read_animated`] reads for [`crate::animation`].
 
 mod accessor;
+mod animation;
 mod buffer;
 mod json;
 mod material;
 mod mesh;
+mod rig;
 #[cfg(test)]
 mod tests;
 
@@ -16,13 +19,38 @@ use std::rc::Rc;
 
 use trixel::UpAxis;
 
+use rig::{Deformable, Local};
+
 use super::assemble::{Assembly, Budget, Part};
 use super::instances::{Child, walk};
 use super::transform::Affine;
 use super::{Loaded, Problem, ReadOptions, Resources};
 
+pub(crate) use rig::Rig;
+
 /// Reads glTF or GLB.
 pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resources) -> Result<Loaded, Problem> {
+    read_document(bytes, options, resources, false).map(|(loaded, _)| loaded)
+}
+
+/// Reads glTF or GLB with what moves it. The mesh is at rest, as its skins place it.
+pub(super) fn read_animated(
+    bytes: &[u8],
+    options: &ReadOptions,
+    resources: &dyn Resources,
+) -> Result<(Loaded, Rig), Problem> {
+    let (mut loaded, rig) = read_document(bytes, options, resources, true)?;
+    let rig = rig.ok_or_else(|| Problem::new("nodes", "were not read"))?;
+    rig.pose(None, 0.0, &mut loaded.mesh);
+    Ok((loaded, rig))
+}
+
+fn read_document(
+    bytes: &[u8],
+    options: &ReadOptions,
+    resources: &dyn Resources,
+    animated: bool,
+) -> Result<(Loaded, Option<Rig>), Problem> {
     let container = buffer::Container::open(bytes)?;
     let document: json::Document<'_> = serde_json::from_slice(container.json)
         .map_err(|error| Problem::new("JSON", format!("{error}; the file is damaged or no glTF")))?;
@@ -34,11 +62,39 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resource
     let mut warnings = container.warnings;
 
     let accessors = accessor::Accessors { document: &document, buffers: &buffers };
+    let mut rig = match animated {
+        true => Some(Rig::read(&document, &accessors, &mut budget.clone(), &mut warnings)?),
+        false => None,
+    };
     let mut meshes = mesh::Meshes::new(accessors, options.attributes, budget);
     let mut assembly = Assembly::new(budget);
     let mut placed: HashMap<usize, Rc<[Part]>> = HashMap::new();
-    let mut place = |meshes: &mut mesh::Meshes<'_>, node: Option<&json::Node<'_>>, mesh: usize, transform: &Affine| {
+    let mut deformable: HashMap<usize, Deformable> = HashMap::new();
+    let mut place = |meshes: &mut mesh::Meshes<'_>,
+                     rig: &mut Option<Rig>,
+                     index: Option<usize>,
+                     mesh: usize,
+                     transform: &Affine| {
+        let node = index.and_then(|index| document.nodes.get(index));
         let weights = node.map_or(&[][..], |node| &node.weights);
+        let instances = match node.and_then(|node| node.extensions.instancing.as_ref()) {
+            Some(instancing) => instance_transforms(meshes, &instancing.attributes)?,
+            None => vec![Affine::IDENTITY],
+        };
+        if let (Some(rig), Some(index)) = (rig, index) {
+            let parts = match deformable.get(&mesh) {
+                Some(parts) => Rc::clone(parts),
+                None => Rc::clone(deformable.entry(mesh).or_insert(meshes.deformable_parts(mesh)?.into())),
+            };
+            for instance in instances {
+                for (i, (part, _)) in parts.iter().enumerate() {
+                    let transform = if rig.is_skinned(index) { Affine::IDENTITY } else { transform.after(&instance) };
+                    let start = assembly.place(part, &transform, |material| material)?;
+                    rig.place(index, &parts, i, instance, start);
+                }
+            }
+            return Ok(());
+        }
         let parts = match placed.get(&mesh) {
             Some(parts) if weights.is_empty() => Rc::clone(parts),
             _ => {
@@ -49,13 +105,9 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resource
                 parts
             }
         };
-        let instances = match node.and_then(|node| node.extensions.instancing.as_ref()) {
-            Some(instancing) => instance_transforms(meshes, &instancing.attributes)?,
-            None => vec![Affine::IDENTITY],
-        };
         for instance in instances {
             let transform = transform.after(&instance);
-            parts.iter().try_for_each(|part| assembly.place(part, &transform, |material| material))?;
+            parts.iter().try_for_each(|part| assembly.place(part, &transform, |material| material).map(|_| ()))?;
         }
         Ok::<(), Problem>(())
     };
@@ -63,7 +115,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resource
     if document.nodes.is_empty() && !document.meshes.is_empty() {
         warnings.push("there is no node that places a mesh: every mesh is read as it is".into());
         for mesh in 0..document.meshes.len() {
-            place(&mut meshes, None, mesh, &Affine::IDENTITY)?;
+            place(&mut meshes, &mut rig, None, mesh, &Affine::IDENTITY)?;
         }
     }
     let children = children(&document)?;
@@ -72,6 +124,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resource
         _ => format!("node {node}"),
     };
     let mut seen = vec![false; document.nodes.len()];
+    let mut parents = vec![None; document.nodes.len()];
     walk(&children, &roots(&document, &children)?, budget.limit(), name, |index, transform| {
         if seen.get_mut(index).is_some_and(|seen| std::mem::replace(seen, true)) {
             return Err(Problem::new(
@@ -79,8 +132,11 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resource
                 "is in the scene twice: listed twice, or both as a root and below another; export the file again",
             ));
         }
+        if let Some(rig) = &mut rig {
+            rig.visit(&document, index, &mut parents);
+        }
         match document.nodes.get(index) {
-            Some(node @ json::Node { mesh: Some(mesh), .. }) => place(&mut meshes, Some(node), *mesh, transform),
+            Some(json::Node { mesh: Some(mesh), .. }) => place(&mut meshes, &mut rig, Some(index), *mesh, transform),
             _ => Ok(()),
         }
     })?;
@@ -98,7 +154,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resource
             mesh.materials.clear();
         }
     }
-    Ok(Loaded { mesh, warnings })
+    Ok((Loaded { mesh, warnings }, rig))
 }
 
 /// Refuses other versions, and extensions without which the file cannot be understood.
@@ -183,14 +239,7 @@ fn roots(document: &json::Document<'_>, children: &[Vec<Child>]) -> Result<Vec<C
 }
 
 fn local_transform(nodes: &[json::Node<'_>], index: usize) -> Affine {
-    let Some(node) = nodes.get(index) else { return Affine::IDENTITY };
-    if let Some(m) = node.matrix {
-        // Column by column in the file; its last row is 0 0 0 1.
-        return Affine(std::array::from_fn(|row| std::array::from_fn(|column| m[4 * column + row])));
-    }
-    let rotation = node.rotation.map_or(Affine::IDENTITY, Affine::rotation);
-    let scale = node.scale.map_or(Affine::IDENTITY, Affine::scale);
-    node.translation.map_or(Affine::IDENTITY, Affine::translation).after(&rotation.after(&scale))
+    nodes.get(index).map_or(Affine::IDENTITY, |node| Local::of(node).transform())
 }
 
 /// The transforms of `EXT_mesh_gpu_instancing`.

@@ -15,7 +15,7 @@ fn square() -> Vec<u8> {
     bytes
 }
 
-fn floats(values: &[f32]) -> Vec<u8> {
+pub(super) fn floats(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
@@ -28,7 +28,7 @@ fn data_uri(bytes: &[u8]) -> String {
 }
 
 /// The square under one node, its bytes in a data URI.
-fn square_document() -> Value {
+pub(super) fn square_document() -> Value {
     json!({
         "asset": {"version": "2.0"},
         "scene": 0,
@@ -48,7 +48,7 @@ fn square_document() -> Value {
 }
 
 /// Appends a buffer, a view of all of it and an accessor; returns the accessor's index.
-fn add_accessor(document: &mut Value, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
+pub(super) fn add_accessor(document: &mut Value, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
     let push = |list: &mut Value, value: Value| {
         let list = list.as_array_mut().unwrap();
         list.push(value);

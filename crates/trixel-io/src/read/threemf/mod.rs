@@ -70,7 +70,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, _: &dyn Resources) -> Re
     walk(&children, &roots, budget.limit(), describe, |node, transform| {
         let (Some(&(part, object)), Some(made)) = (objects.get(node), made.get_mut(node)) else { return Ok(()) };
         let made = made.get_or_insert_with(|| properties.part(part, object));
-        assembly.place(made, transform, |material| material)
+        assembly.place(made, transform, |material| material).map(|_| ())
     })?;
 
     let mut mesh = assembly.finish();

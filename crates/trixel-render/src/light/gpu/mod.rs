@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use trixel_gpu::Gpu;
 
+use super::camera::Orbit;
 use super::error::LightError;
 use super::options::{Effect, LightOptions, Surfaces};
 use super::radiance::Radiance;
@@ -59,6 +60,17 @@ impl LightRenderer {
             Effect::TransparentShadow => Shaders::Shadow(Box::new(Shadow::new(gpu, options)?)),
         };
         Ok(Self { gpu: gpu.clone(), options: options.clone(), shaders })
+    }
+
+    /// Moves the camera.
+    ///
+    /// # Errors
+    /// When it is out of range; then it stays where it was.
+    pub fn set_orbit(&mut self, orbit: Orbit) -> Result<(), LightError> {
+        let options = LightOptions { orbit, ..self.options.clone() };
+        options.check()?;
+        self.options = options;
+        Ok(())
     }
 
     /// Voxelizes a scene and takes its picture.
