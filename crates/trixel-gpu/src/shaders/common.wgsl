@@ -12,6 +12,9 @@ const SHELL: u32 = 4u;
 const STEPS: i32 = 65536;
 const WORKGROUP: u32 = 64u;
 
+// The triangle that this invocation paints, for entries that name it.
+var<private> painting: u32 = 0u;
+
 struct Params {
     // The grid, all of it.
     dims: vec3<i32>,

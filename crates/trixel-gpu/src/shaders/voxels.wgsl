@@ -8,9 +8,6 @@ const TO_FRAGMENTS: u32 = 2u;
 // To a list alone, with the triangle.
 const TO_PAIRS: u32 = 3u;
 
-// The triangle that this invocation paints.
-var<private> painting: u32 = 0u;
-
 @group(0) @binding(3) var<storage, read_write> voxels: array<atomic<u32>>;
 
 fn column_start(column: vec2<i32>) -> u32 {
