@@ -5,6 +5,8 @@
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
+use trixel::VoxelOrder;
+
 use crate::attributes::Recipe;
 use crate::error::GpuError;
 use crate::gpu::Gpu;
@@ -34,6 +36,8 @@ pub(crate) enum Kernel {
     WriteNodes,
     WriteBricks,
     Answer,
+    MarchOctree,
+    MarchBricks,
     CountBeforePlanes,
     LocateFragments,
     Prioritize(Recipe),
@@ -77,6 +81,8 @@ impl Kernel {
             Self::WriteNodes,
             Self::WriteBricks,
             Self::Answer,
+            Self::MarchOctree,
+            Self::MarchBricks,
             Self::CountBeforePlanes,
             Self::LocateFragments,
         ];
@@ -101,6 +107,7 @@ impl Kernel {
             Self::WriteNodes => "write_nodes",
             Self::WriteBricks => "write_bricks",
             Self::Answer => "answer",
+            Self::MarchOctree | Self::MarchBricks => "march_rays",
             Self::CountBeforePlanes => "count_before_planes",
             Self::LocateFragments => "locate_fragments",
             Self::Prioritize(_) => "prioritize",
@@ -130,6 +137,12 @@ impl Kernel {
             Self::WriteNodes => shader!("numbering" "octree_nodes"),
             Self::WriteBricks => shader!("numbering" "entry" "sparse" "bricks"),
             Self::Answer => shader!("numbering" "entry" "octree_query"),
+            Self::MarchOctree => {
+                shader!("product_portable" "wide" "division" "numbering" "entry" "march" "octree_cell")
+            }
+            Self::MarchBricks => {
+                shader!("product_portable" "wide" "division" "numbering" "entry" "sort_key" "march" "brick_cell")
+            }
             Self::CountBeforePlanes | Self::LocateFragments => shader!("numbering" "entry" "locate"),
             Self::Prioritize(_) | Self::Weigh(_) => shader!(
                 "product_portable" "wide" "division" "numbering" "entry" "light" "surface" "nearest" "overlap" "combine"
@@ -152,6 +165,7 @@ impl Kernel {
     pub(crate) fn source(self) -> String {
         let constants = match self {
             Self::CountDigits(key) | Self::MoveEntries(key) => format!("const ORDER: u32 = {}u;\n", key.code()),
+            Self::MarchBricks => format!("const ORDER: u32 = {}u;\n", SortKey::Voxels(VoxelOrder::Morton).code()),
             Self::Prioritize(recipe)
             | Self::Weigh(recipe)
             | Self::ChooseWinners(recipe)

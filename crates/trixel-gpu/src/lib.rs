@@ -47,7 +47,7 @@ pub use limits::MAX_EXTENT;
 pub use lists::{GpuVoxelList, ListMethod, UnknownListMethod};
 pub use material_volume::{Decoding, MaterialTexels, MaterialVolume, Media, Medium, Precision, VoxelMaterial};
 pub use mesh::GpuMesh;
-pub use sparse::{GpuBrickMap, GpuOctree};
+pub use sparse::{GpuBrickMap, GpuOctree, GridRay};
 pub use tier::Tier;
 pub use timer::PassTime;
 pub use tune::{Sample, Tuning, measure, tune};

@@ -5,6 +5,8 @@
 //! prefix sums over the bits give each fragment its voxel's place in the list; each fragment adds itself to its voxel's state;
 //! and each voxel turns its state into a row. Nothing is as large as the grid but its bits.
 
+#[cfg(test)]
+mod interpolation;
 mod recipe;
 mod surface;
 
