@@ -1,6 +1,7 @@
 //! Attributes on the GPU against the CPU's, and cases whose values are known.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a failure here is a failed test")]
+#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "made-up numbers that fit")]
 
 use std::sync::Mutex;
 
@@ -290,7 +291,7 @@ fn closed_forms() {
     two.materials = vec![material([1.0, 0.0, 0.0, 1.0]), material([0.0, 0.0, 1.0, 1.0])];
     // A texel a voxel.
     let mut checkered = quad();
-    let texel = |x: u32, y: u32| if (x + y) % 2 == 0 { [255, 255, 255, 255] } else { [0, 0, 0, 255] };
+    let texel = |x: u32, y: u32| if (x + y).is_multiple_of(2) { [255, 255, 255, 255] } else { [0, 0, 0, 255] };
     let pixels = (0..8).flat_map(|y| (0..8).flat_map(move |x| texel(x, y))).collect();
     checkered.images = vec![Image { name: String::new(), source: ImageSource::Rgba8 { width: 8, height: 8, pixels } }];
     checkered.textures = vec![Texture { image: 0, wrap: [Wrap::Repeat; 2], filter: Filter::Linear, mipmaps: true }];

@@ -78,8 +78,9 @@ fn drawn(gpu: &Gpu, triangle: [[f32; 2]; 3], dilation: Dilation) -> Vec<[f32; 4]
     let params = [SIZE, SIZE, 8, 2, 0, SIZE, 0, 1, 0, 1000, 0, 0, 0, 0, 64f32.to_bits(), 64f32.to_bits()];
     let steps = |c: f32| (c * 65_536.0).round() as i32;
     let positions: Vec<i32> = triangle.iter().flat_map(|[x, y]| [steps(*x), steps(*y), 3 * 65_536 + 7]).collect();
-    let buffers = [bytemuck::cast_slice(&params), bytemuck::cast_slice(&positions), bytemuck::cast_slice(&[0u32, 1, 2])]
-        .map(|bytes: &[u8]| gpu.buffer_with("trixel test", bytes, usage).unwrap());
+    let buffers =
+        [bytemuck::cast_slice(&params), bytemuck::cast_slice(&positions), bytemuck::cast_slice(&[0u32, 1, 2])]
+            .map(|bytes: &[u8]| gpu.buffer_with("trixel test", bytes, usage).unwrap());
     let entries: Vec<_> = (0u32..)
         .zip(&buffers)
         .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
