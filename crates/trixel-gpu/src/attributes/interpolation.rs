@@ -76,6 +76,7 @@ fn drawn(gpu: &Gpu, triangle: [[f32; 2]; 3], dilation: Dilation) -> Vec<[f32; 4]
     let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::UNIFORM;
     // `Params` of `common.wgsl`: a grid of 64 x 64 x 8.
     let params = [SIZE, SIZE, 8, 2, 0, SIZE, 0, 1, 0, 1000, 0, 0, 0, 0, 64f32.to_bits(), 64f32.to_bits()];
+    #[expect(clippy::cast_possible_truncation, reason = "within the grid")]
     let steps = |c: f32| (c * 65_536.0).round() as i32;
     let positions: Vec<i32> = triangle.iter().flat_map(|[x, y]| [steps(*x), steps(*y), 3 * 65_536 + 7]).collect();
     let buffers =
@@ -128,7 +129,7 @@ fn drawn(gpu: &Gpu, triangle: [[f32; 2]; 3], dilation: Dilation) -> Vec<[f32; 4]
         size,
     );
     gpu.queue().submit([encoder.finish()]);
-    gpu.read(&staging, bytes, |bytes| bytemuck::pod_collect_to_vec::<u8, [f32; 4]>(bytes)).unwrap()
+    gpu.read(&staging, bytes, bytemuck::pod_collect_to_vec::<u8, [f32; 4]>).unwrap()
 }
 
 #[test]
@@ -151,12 +152,12 @@ fn interpolated_barycentrics_are_the_computed_ones() {
                 let longest = [u, v, sub(c, b)].map(|e| e[0].hypot(e[1])).into_iter().fold(0.0, f64::max);
                 let bound = 0.125 * longest / turn(u, v).abs();
                 let mut pixels = 0;
-                for (i, shown) in drawn(&gpu, triangle, dilation).into_iter().enumerate() {
+                for (i, shown) in (0u32..).zip(drawn(&gpu, triangle, dilation)) {
                     if shown[3] == 0.0 {
                         continue;
                     }
                     pixels += 1;
-                    let (x, y) = (i as u32 % SIZE, i as u32 / SIZE);
+                    let (x, y) = (i % SIZE, i / SIZE);
                     let p = sub([f64::from(x) + 0.5, f64::from(y) + 0.5], a);
                     let computed = [turn(p, v) / turn(u, v), turn(u, p) / turn(u, v)];
                     for k in 0..2 {

@@ -67,9 +67,9 @@ fn voxel_behind(t: Fraction, o: i32, d: i32) -> i32 {
 
 // The last entry and the first exit of a box.
 struct Span {
-    from: Fraction,
+    enters: Fraction,
     axis: u32,
-    to: Fraction,
+    leaves: Fraction,
     meets: bool,
 }
 
@@ -82,15 +82,15 @@ fn span_of(low: vec3<i32>, width: i32, o: vec3<i32>, d: vec3<i32>) -> Span {
         }
         let near = passing(select(low[i] + width, low[i], d[i] > 0), o[i], d[i]);
         let far = passing(select(low[i], low[i] + width, d[i] > 0), o[i], d[i]);
-        if less(s.from, near) {
-            s.from = near;
+        if less(s.enters, near) {
+            s.enters = near;
             s.axis = i;
         }
-        if less(far, s.to) {
-            s.to = far;
+        if less(far, s.leaves) {
+            s.leaves = far;
         }
     }
-    s.meets = s.meets && less(s.from, s.to);
+    s.meets = s.meets && less(s.enters, s.leaves);
     return s;
 }
 
@@ -114,11 +114,11 @@ fn march_rays(
         return;
     }
     if goes_on {
-        span.from = Fraction(bitcast<i32>(hits[6u * ray + 4u]), bitcast<i32>(hits[6u * ray + 5u]));
+        span.enters = Fraction(bitcast<i32>(hits[6u * ray + 4u]), bitcast<i32>(hits[6u * ray + 5u]));
     }
     // The voxel behind the entry, and then behind the exit of each empty cube: a box that the ray crosses for certain.
     for (var step = 0u; step < STEPS; step++) {
-        let t = span.from;
+        let t = span.enters;
         let v = vec3<i32>(
             voxel_behind(t, o.x, d.x),
             voxel_behind(t, o.y, d.y),
@@ -135,14 +135,14 @@ fn march_rays(
             hits[6u * ray + 1u] = entry.x;
             hits[6u * ray + 2u] = entry.y;
             hits[6u * ray + 3u] = own.axis;
-            hits[6u * ray + 4u] = bitcast<u32>(own.from.num);
-            hits[6u * ray + 5u] = bitcast<u32>(own.from.den);
+            hits[6u * ray + 4u] = bitcast<u32>(own.enters.num);
+            hits[6u * ray + 5u] = bitcast<u32>(own.enters.den);
             return;
         }
         let low = (v >> vec3<u32>(place.level)) << vec3<u32>(place.level);
-        span.from = span_of(low, 1i << place.level, o, d).to;
+        span.enters = span_of(low, 1i << place.level, o, d).leaves;
     }
     hits[6u * ray] = UNDECIDED;
-    hits[6u * ray + 4u] = bitcast<u32>(span.from.num);
-    hits[6u * ray + 5u] = bitcast<u32>(span.from.den);
+    hits[6u * ray + 4u] = bitcast<u32>(span.enters.num);
+    hits[6u * ray + 5u] = bitcast<u32>(span.enters.den);
 }
