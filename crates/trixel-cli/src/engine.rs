@@ -3,16 +3,18 @@
 use std::time::Instant;
 
 use anyhow::Result;
+use trixel::attributes::{AttributeRequest, VoxelAttributes};
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, CpuBackend, Job, Strategy, Volume};
+use trixel::{Backend, CpuBackend, Job, Mesh, Strategy, Volume, VoxelOrder};
 use trixel_gpu::{
-    AdapterChoice, Counters, Cutoff, Gpu, GpuError, GpuMesh, GpuVolume, Heuristic, Options, STRATEGIES, Voxelizer,
+    AdapterChoice, Counters, Cutoff, Gpu, GpuError, GpuMesh, GpuSurface, GpuVolume, Heuristic, ListMethod, Options,
+    STRATEGIES, Voxelizer,
 };
 
-use crate::args::{BackendArg, MethodArgs};
+use crate::args::{BackendArg, MethodArgs, VoxelizeArgs};
 use crate::grid::usage;
 use crate::progress::Reporter;
-use crate::report::{AdapterReport, CutoffReport};
+use crate::report::{AdapterReport, CutoffReport, ListReport};
 use crate::tuned;
 
 /// An open backend.
@@ -24,6 +26,17 @@ pub(crate) enum Engine {
         /// Whether the CPU takes over, with a warning, when the GPU fails.
         cpu_may_help: bool,
     },
+}
+
+/// What to do with a mesh.
+pub(crate) struct Task<'a> {
+    pub(crate) mesh: &'a Mesh,
+    pub(crate) lattice: &'a LatticeMesh<'a>,
+    pub(crate) job: &'a Job,
+    pub(crate) repeat: u32,
+    pub(crate) attributes: Option<&'a AttributeRequest>,
+    /// How a GPU is to list the voxels.
+    pub(crate) list_method: Option<ListMethod>,
 }
 
 /// What a run did.
@@ -38,6 +51,9 @@ pub(crate) struct Ran {
     pub(crate) upload_ms: Option<f64>,
     pub(crate) samples_ms: Vec<f64>,
     pub(crate) download_ms: Option<f64>,
+    pub(crate) list: Option<ListReport>,
+    /// Attributes, where the device found them, and how long it took.
+    pub(crate) attributes: Option<(VoxelAttributes, f64)>,
 }
 
 impl Engine {
@@ -65,6 +81,13 @@ impl Engine {
         }
         if Self::is_gpu_named(method) && strategy == Strategy::ColumnRuns {
             usage("--strategy column-runs is the processor's; leave it out, or use --backend cpu");
+        }
+    }
+
+    /// Refuses a list method where no GPU is asked for.
+    pub(crate) fn check_list_method(args: &VoxelizeArgs) {
+        if args.list_method.is_some() && !Self::is_gpu_named(&args.method) {
+            usage("--list-method is about lists on a GPU; add --backend gpu, or leave it out");
         }
     }
 
@@ -111,32 +134,23 @@ impl Engine {
         matches!(self, Self::Cpu | Self::Gpu { cpu_may_help: true, .. })
     }
 
-    /// Voxelizes `repeat` times.
-    pub(crate) fn run(
-        &self,
-        mesh: &LatticeMesh<'_>,
-        job: &Job,
-        volume: &mut Volume,
-        repeat: u32,
-        reporter: &Reporter,
-    ) -> Result<Ran> {
+    /// Voxelizes as often as the task says.
+    pub(crate) fn run(&self, task: &Task<'_>, volume: &mut Volume, reporter: &Reporter) -> Result<Ran> {
         match self {
-            Self::Cpu => run_on_cpu(mesh, job, volume, repeat, reporter),
-            Self::Gpu { gpu, options, cpu_may_help } => {
-                match run_on_gpu(gpu, options, mesh, job, volume, repeat, reporter) {
-                    Err(error) if *cpu_may_help => {
-                        reporter.warn(format!("{error}; the processor computes instead"));
-                        run_on_cpu(mesh, job, volume, repeat, reporter)
-                    }
-                    ran => Ok(ran?),
+            Self::Cpu => run_on_cpu(task, volume, reporter),
+            Self::Gpu { gpu, options, cpu_may_help } => match run_on_gpu(gpu, options, task, volume, reporter) {
+                Err(error) if *cpu_may_help => {
+                    reporter.warn(format!("{error}; the processor computes instead"));
+                    run_on_cpu(task, volume, reporter)
                 }
-            }
+                ran => Ok(ran?),
+            },
         }
     }
 }
 
-fn run_on_cpu(mesh: &LatticeMesh<'_>, job: &Job, volume: &mut Volume, repeat: u32, reporter: &Reporter) -> Result<Ran> {
-    on_cpu(repeat, reporter, || CpuBackend::default().voxelize(mesh, job, volume))
+fn run_on_cpu(task: &Task<'_>, volume: &mut Volume, reporter: &Reporter) -> Result<Ran> {
+    on_cpu(task.repeat, reporter, || CpuBackend::default().voxelize(task.lattice, task.job, volume))
 }
 
 /// Runs a voxelization on the CPU `repeat` times.
@@ -163,18 +177,19 @@ pub(crate) fn on_cpu(
         upload_ms: None,
         samples_ms,
         download_ms: None,
+        list: None,
+        attributes: None,
     })
 }
 
 fn run_on_gpu(
     gpu: &Gpu,
     options: &Options,
-    mesh: &LatticeMesh<'_>,
-    job: &Job,
+    task: &Task<'_>,
     volume: &mut Volume,
-    repeat: u32,
     reporter: &Reporter,
 ) -> Result<Ran, GpuError> {
+    let (mesh, job) = (task.lattice, task.job);
     let (voxelizer, check_ms) =
         reporter.stage("checking the GPU and building its pipelines", || Voxelizer::new(gpu, job, options));
     let mut voxelizer = voxelizer?;
@@ -182,7 +197,7 @@ fn run_on_gpu(
     let on_gpu = on_gpu?;
     let voxels = GpuVolume::new(gpu, *job.grid())?;
     let mut samples_ms = vec![];
-    for _ in 0..repeat {
+    for _ in 0..task.repeat {
         let (ran, ms) = reporter.stage("voxelizing", || voxelizer.run(&on_gpu, &voxels));
         ran?;
         samples_ms.push(ms);
@@ -191,6 +206,22 @@ fn run_on_gpu(
     let passes_ms = voxelizer.pass_times()?.iter().map(|pass| (pass.name, pass.ms)).collect();
     let start = Instant::now();
     voxels.download(gpu, volume)?;
+    let download_ms = start.elapsed().as_secs_f64() * 1e3;
+    let list =
+        task.list_method.map(|method| list(&mut voxelizer, &on_gpu, method, task.repeat, reporter)).transpose()?;
+    let attributes = task.attributes.and_then(|request| {
+        let (found, ms) = reporter.stage("finding attributes", || {
+            let surface = GpuSurface::upload(gpu, task.mesh, mesh, job.grid(), request)?;
+            voxelizer.attributes(&surface, &voxels)?.download(gpu, task.mesh)
+        });
+        match found {
+            Ok(attributes) => Some((attributes, ms)),
+            Err(error) => {
+                reporter.warn(format!("{error}; the processor finds the attributes instead"));
+                None
+            }
+        }
+    });
     let strategy = voxelizer.strategy();
     let hybrid = matches!(strategy, Strategy::Hybrid | Strategy::HybridTwoPass);
     Ok(Ran {
@@ -203,6 +234,25 @@ fn run_on_gpu(
         check_ms: Some(check_ms),
         upload_ms: Some(upload_ms),
         samples_ms,
-        download_ms: Some(start.elapsed().as_secs_f64() * 1e3),
+        download_ms: Some(download_ms),
+        list,
+        attributes,
     })
+}
+
+/// Lists the voxels by a method, as often as voxelizing is repeated.
+fn list(
+    voxelizer: &mut Voxelizer,
+    mesh: &GpuMesh,
+    method: ListMethod,
+    repeat: u32,
+    reporter: &Reporter,
+) -> Result<ListReport, GpuError> {
+    let mut report = ListReport::new(method);
+    for _ in 0..repeat {
+        let (list, ms) = reporter.stage("listing", || voxelizer.list(mesh, method, VoxelOrder::Xyz));
+        report.add(&list?, ms);
+    }
+    reporter.say(&report.to_string());
+    Ok(report)
 }

@@ -15,7 +15,7 @@ use trixel_io::textures::decode_textures;
 use trixel_io::write::WriteOptions;
 
 use crate::args::{MethodArgs, VoxelizeArgs};
-use crate::engine::Engine;
+use crate::engine::{Engine, Task};
 use crate::grid::{GridRequest, usage};
 use crate::progress::Reporter;
 use crate::report::{AttributesReport, GridReport, MeshReport, Report, Samples, Stages, median};
@@ -32,6 +32,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
         usage("nothing to write: give -o OUT (for example -o voxels.npz) or --report FILE.json");
     }
     check_method(&args.method);
+    Engine::check_list_method(&args);
     args.outputs.iter().try_for_each(|output| volume::check_extension(output))?;
     check_paths(&args.inputs, &args.outputs, args.report.as_deref())?;
     if let Some(report) = &args.report {
@@ -86,7 +87,15 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let mut voxels = voxels?;
     stages.allocate = allocate_ms;
 
-    let ran = voxels.fill(&engine, &lattice, &job, args.repeat.get(), &reporter)?;
+    let task = Task {
+        mesh: &loaded,
+        lattice: &lattice,
+        job: &job,
+        repeat: args.repeat.get(),
+        attributes: wanted.as_ref(),
+        list_method: args.list_method.map(Into::into),
+    };
+    let mut ran = voxels.fill(&engine, &task, &reporter)?;
     stages.open = ran.check_ms.map(|check_ms| open_ms + check_ms);
     stages.upload = ran.upload_ms;
     stages.download = ran.download_ms;
@@ -99,8 +108,12 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
         stages.rank = Some(ms);
         rank
     });
-    let described = match (&wanted, dense) {
-        (Some(wanted), Some(dense)) => {
+    let described = match (&wanted, dense, ran.attributes.take()) {
+        (Some(_), _, Some((found, ms))) => {
+            stages.attributes = Some(ms);
+            Some(found)
+        }
+        (Some(wanted), Some(dense), None) => {
             let (described, ms) =
                 reporter.stage("finding attributes", || compute(&loaded, &lattice, &job, dense, wanted));
             stages.attributes = Some(ms);
@@ -161,6 +174,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
             samples_ms: samples,
             counters: ran.counters,
             cutoff: ran.cutoff,
+            list: ran.list,
             passes_ms: ran.passes_ms,
             peak_memory_bytes: memory::peak(),
             outputs: args.outputs.iter().map(|path| path.display().to_string()).collect(),

@@ -3,14 +3,13 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use trixel::lattice::LatticeMesh;
 use trixel::{BrickMap, Bytes, CpuBackend, Job, Occupancy, Strategy, Volume};
 use trixel_io::VolumeFormat;
 use trixel_io::atomic_file::Staged;
 use trixel_io::write::{WriteOptions, write_bricks};
 
 use crate::args::VoxelizeArgs;
-use crate::engine::{self, Engine, Ran};
+use crate::engine::{self, Engine, Ran, Task};
 use crate::progress::Reporter;
 use crate::{memory, volume};
 
@@ -43,18 +42,12 @@ impl Voxels {
         }
     }
 
-    /// Overwrites them with the voxels of a mesh, `repeat` times.
-    pub(crate) fn fill(
-        &mut self,
-        engine: &Engine,
-        lattice: &LatticeMesh<'_>,
-        job: &Job,
-        repeat: u32,
-        reporter: &Reporter,
-    ) -> Result<Ran> {
+    /// Overwrites them with the voxels of a mesh, as often as the task says.
+    pub(crate) fn fill(&mut self, engine: &Engine, task: &Task<'_>, reporter: &Reporter) -> Result<Ran> {
         match self {
-            Self::Dense(volume) => engine.run(lattice, job, volume, repeat, reporter),
-            Self::Bricks(map) => engine::on_cpu(repeat, reporter, || {
+            Self::Dense(volume) => engine.run(task, volume, reporter),
+            Self::Bricks(map) => engine::on_cpu(task.repeat, reporter, || {
+                let Task { lattice, job, .. } = task;
                 // The last ones first, so that there is room for the new.
                 *map = BrickMap::empty(*job.grid());
                 *map = CpuBackend::default().voxelize_bricks(lattice, job, memory::available_for_voxels())?;

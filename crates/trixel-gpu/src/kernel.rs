@@ -7,9 +7,11 @@ use std::sync::{Mutex, PoisonError};
 
 use trixel::VoxelOrder;
 
+use crate::attributes::Recipe;
 use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::limits::WORKGROUP;
+use crate::lists::SortKey;
 use crate::shader::shader;
 
 /// A function of a shader, with the constants in front of it.
@@ -22,8 +24,8 @@ pub(crate) enum Kernel {
     SumWords,
     SumCells,
     Traverse,
-    CountDigits(VoxelOrder),
-    MoveEntries(VoxelOrder),
+    CountDigits(SortKey),
+    MoveEntries(SortKey),
     CountDistinct,
     WriteDistinct,
     MarkCubes,
@@ -34,14 +36,35 @@ pub(crate) enum Kernel {
     WriteNodes,
     WriteBricks,
     Answer,
+    MarchOctree,
+    MarchBricks,
+    CountBeforePlanes,
+    LocateFragments,
+    Prioritize(Recipe),
+    Weigh(Recipe),
+    ChooseWinners(Recipe),
+    WriteVoxelRows(Recipe),
+    GatherPairs(Recipe),
+    WriteFragmentRows(Recipe),
+    CopyCounts(Recipe),
 }
 
 impl Kernel {
     /// Every kernel.
     #[cfg(test)]
     pub(crate) fn all() -> Vec<Self> {
-        let orders = [VoxelOrder::Xyz, VoxelOrder::Morton];
-        let sorting = orders.into_iter().flat_map(|order| [Self::CountDigits(order), Self::MoveEntries(order)]);
+        let sorting = SortKey::ALL.into_iter().flat_map(|key| [Self::CountDigits(key), Self::MoveEntries(key)]);
+        let attributes = Recipe::samples().into_iter().flat_map(|recipe| {
+            [
+                Self::Prioritize(recipe),
+                Self::Weigh(recipe),
+                Self::ChooseWinners(recipe),
+                Self::WriteVoxelRows(recipe),
+                Self::GatherPairs(recipe),
+                Self::WriteFragmentRows(recipe),
+                Self::CopyCounts(recipe),
+            ]
+        });
         let others = [
             Self::ScanBlocks,
             Self::AddTotals,
@@ -58,8 +81,12 @@ impl Kernel {
             Self::WriteNodes,
             Self::WriteBricks,
             Self::Answer,
+            Self::MarchOctree,
+            Self::MarchBricks,
+            Self::CountBeforePlanes,
+            Self::LocateFragments,
         ];
-        others.into_iter().chain(sorting).collect()
+        others.into_iter().chain(sorting).chain(attributes).collect()
     }
 
     pub(crate) fn entry_point(self) -> &'static str {
@@ -80,6 +107,16 @@ impl Kernel {
             Self::WriteNodes => "write_nodes",
             Self::WriteBricks => "write_bricks",
             Self::Answer => "answer",
+            Self::MarchOctree | Self::MarchBricks => "march_rays",
+            Self::CountBeforePlanes => "count_before_planes",
+            Self::LocateFragments => "locate_fragments",
+            Self::Prioritize(_) => "prioritize",
+            Self::Weigh(_) => "weigh",
+            Self::ChooseWinners(_) => "choose_winners",
+            Self::WriteVoxelRows(_) => "write_voxel_rows",
+            Self::GatherPairs(_) => "gather_pairs",
+            Self::WriteFragmentRows(_) => "write_fragment_rows",
+            Self::CopyCounts(_) => "copy_counts",
         }
     }
 
@@ -100,15 +137,42 @@ impl Kernel {
             Self::WriteNodes => shader!("numbering" "octree_nodes"),
             Self::WriteBricks => shader!("numbering" "entry" "sparse" "bricks"),
             Self::Answer => shader!("numbering" "entry" "octree_query"),
+            Self::MarchOctree => {
+                shader!("product_portable" "wide" "division" "numbering" "entry" "march" "octree_cell")
+            }
+            Self::MarchBricks => {
+                shader!("product_portable" "wide" "division" "numbering" "entry" "sort_key" "march" "brick_cell")
+            }
+            Self::CountBeforePlanes | Self::LocateFragments => shader!("numbering" "entry" "locate"),
+            Self::Prioritize(_) | Self::Weigh(_) => shader!(
+                "product_portable" "wide" "division" "numbering" "entry" "light" "surface" "nearest" "overlap" "combine"
+                "weigh"
+            ),
+            Self::ChooseWinners(_) => shader!("numbering" "win"),
+            Self::WriteVoxelRows(_) => shader!(
+                "product_portable" "wide" "division" "numbering" "entry" "light" "surface" "nearest" "combine" "put_row"
+                "voxel_rows"
+            ),
+            Self::GatherPairs(_) | Self::CopyCounts(_) => shader!("numbering" "gather"),
+            Self::WriteFragmentRows(_) => shader!(
+                "product_portable" "wide" "division" "numbering" "entry" "light" "surface" "nearest" "combine" "put_row"
+                "fragment_rows"
+            ),
         }
     }
 
     /// The WGSL.
     pub(crate) fn source(self) -> String {
         let constants = match self {
-            Self::CountDigits(order) | Self::MoveEntries(order) => {
-                format!("const ORDER: u32 = {}u;\n", u32::from(order == VoxelOrder::Morton))
-            }
+            Self::CountDigits(key) | Self::MoveEntries(key) => format!("const ORDER: u32 = {}u;\n", key.code()),
+            Self::MarchBricks => format!("const ORDER: u32 = {}u;\n", SortKey::Voxels(VoxelOrder::Morton).code()),
+            Self::Prioritize(recipe)
+            | Self::Weigh(recipe)
+            | Self::ChooseWinners(recipe)
+            | Self::WriteVoxelRows(recipe)
+            | Self::GatherPairs(recipe)
+            | Self::WriteFragmentRows(recipe)
+            | Self::CopyCounts(recipe) => recipe.constants(),
             _ => String::new(),
         };
         [&[constants.as_str()], self.files()].concat().join("\n")

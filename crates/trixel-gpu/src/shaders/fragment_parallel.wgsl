@@ -192,6 +192,7 @@ fn dilate(@builtin(vertex_index) index: u32) -> Varyings {
     }
     let t = triangle_of(shape);
     var v = pack(t);
+    v.low.w = triangle;
     let pixel = dilated(t, corner) + vec2<f32>(t.base.xy - window_corner(t.flags & AXIS_MASK));
     let unit = pixel / params.window_size;
     v.position = vec4<f32>(2.0 * unit.x - 1.0, 1.0 - 2.0 * unit.y, 0.5, 1.0);
@@ -201,6 +202,7 @@ fn dilate(@builtin(vertex_index) index: u32) -> Varyings {
 @fragment
 fn fragment_parallel(v: Varyings) -> @location(0) vec4<f32> {
     let t = unpack(v);
+    painting = v.low.w;
     count_too_large(t.flags);
     if (t.flags & EMPTY) != 0u {
         return vec4<f32>(0.0);
