@@ -391,6 +391,40 @@ fn contradicting_gpu_arguments_are_refused() {
     }
 }
 
+#[test]
+fn light_is_rendered_and_compared_and_filmed() {
+    let bench = Bench::new();
+    let small = "--size 24x18 -r 16 --samples 1";
+    bench.ok(&format!("render scene:torus:24 --effect refraction --reference {small} -o traced.png"));
+    let said = bench.ok(&format!(
+        "render scene:torus:24 --effect refraction --adapter llvmpipe {small} -o lit.png --compare traced.png"
+    ));
+    let decibels: f64 = said.stderr.split("traced.png: ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!(decibels > 15.0, "{}", said.stderr);
+
+    let film = format!("animate scene:glass-ball:4 --frames 3 --seconds 0.5 --adapter llvmpipe {small}");
+    bench.ok(&format!("{film} -o film.gif --report r.json"));
+    assert!(std::fs::read(bench.path("film.gif")).unwrap().starts_with(b"GIF89a"));
+    let report = bench.json("r.json");
+    assert_eq!((report["frames_ms"].as_array().unwrap().len(), &report["seconds"]), (3, &0.5.into()));
+    bench.ok(&format!("{film} -o frames/"));
+    bench.ok(&format!("{film} -o film.apng"));
+    assert_eq!(std::fs::read_dir(bench.path("frames")).unwrap().count(), 3);
+
+    for (status, arguments, words) in [
+        (1, "render scene:torus -o a.jpg", ["a.jpg", ".png"]),
+        (1, "render scene:glass-ball --material wood=1.5 -o a.png", ["wood", "`amber`"]),
+        (2, "render scene:torus --material 0 -o a.png", ["refraction index", "0.1"]),
+        (1, "render scene:torus --environment none.hdr -o a.png", ["none.hdr", "sky, white, black"]),
+        (1, "animate scene:torus -o a.mp4", ["a.mp4", ".gif"]),
+        (1, "animate scene:torus --animation run -o b/", ["run", "no animation"]),
+        (2, "animate scene:torus --seconds 0 -o a.gif", ["0.02", "600"]),
+        (1, "animate scene:torus --adapter no-such-gpu -o c/", ["no-such-gpu", "there are"]),
+    ] {
+        bench.fails(status, arguments, &words);
+    }
+}
+
 /// A square of two materials, one with a texture that is not there.
 fn square(bench: &Bench) {
     bench.write(
