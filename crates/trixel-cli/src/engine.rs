@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::Result;
 use trixel::attributes::{AttributeRequest, VoxelAttributes};
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, CpuBackend, Job, Mesh, Strategy, Volume, VoxelOrder};
+use trixel::{Backend, Bytes, CpuBackend, Job, Mesh, Strategy, Volume, VoxelOrder};
 use trixel_gpu::{
     AdapterChoice, Counters, Cutoff, Gpu, GpuError, GpuMesh, GpuSurface, GpuVolume, Heuristic, ListMethod, Options,
     STRATEGIES, Voxelizer,
@@ -212,7 +212,10 @@ fn run_on_gpu(
     let attributes = task.attributes.and_then(|request| {
         let (found, ms) = reporter.stage("finding attributes", || {
             let surface = GpuSurface::upload(gpu, task.mesh, mesh, job.grid(), request)?;
-            voxelizer.attributes(&surface, &voxels)?.download(gpu, task.mesh)
+            let found = voxelizer.attributes(&surface, &voxels)?;
+            let [rows, scratch, uploaded] = [found.bytes(), found.scratch_bytes(), surface.bytes()].map(Bytes);
+            reporter.say(&format!("attributes: {rows}, {scratch} to find them, {uploaded} of surfaces and textures"));
+            found.download(gpu, task.mesh)
         });
         match found {
             Ok(attributes) => Some((attributes, ms)),
