@@ -628,6 +628,10 @@ pub(crate) enum StrategyArg {
     HybridTwoPass,
     /// GPU: one invocation a pair of triangle and column.
     Balanced,
+    /// GPU, mode sliced: each triangle once for each slice that it may meet, in one draw.
+    Sliced,
+    /// GPU, mode sliced: the whole mesh once for each slice.
+    SlicePerPass,
 }
 
 impl From<StrategyArg> for Strategy {
@@ -640,6 +644,8 @@ impl From<StrategyArg> for Strategy {
             StrategyArg::Hybrid => Self::Hybrid,
             StrategyArg::HybridTwoPass => Self::HybridTwoPass,
             StrategyArg::Balanced => Self::Balanced,
+            StrategyArg::Sliced => Self::Sliced,
+            StrategyArg::SlicePerPass => Self::SlicePerPass,
         }
     }
 }

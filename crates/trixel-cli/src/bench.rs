@@ -10,7 +10,7 @@ use trixel::{Mode, Strategy};
 use trixel_bench::measure::Plan;
 use trixel_bench::results::SCHEMA;
 use trixel_bench::{Results, compare, html, text};
-use trixel_gpu::{AdapterChoice, Gpu, GpuError, STRATEGIES};
+use trixel_gpu::{AdapterChoice, Gpu, GpuError, STRATEGIES, strategies_of};
 use trixel_io::atomic_file::{AtomicFile, Staged};
 
 use crate::args::{BackendArg, BenchArgs, FigureArg, TableArg};
@@ -25,7 +25,8 @@ const LOW_CUTOFFS: [f32; 14] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6
 const HIGH_CUTOFFS: [f32; 7] = [32.0, 64.0, 128.0, 256.0, 512.0, 1024.0, 2048.0];
 
 pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
-    let strategies = strategies(args);
+    let mode = mode(args);
+    let strategies = strategies(args, mode);
     set_threads(args.threads)?;
     // Found out before the work: what cannot be read or written.
     let before = args.compare.as_deref().map(read_results).transpose()?;
@@ -35,11 +36,9 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
     }
     let reporter = Reporter::new(false);
     let gpu = open(args, &reporter)?;
-    // The paper's table is of thin voxels.
-    let default_mode = if args.table == Some(TableArg::Hcv) { Mode::Thin } else { Mode::Conservative };
     let plan = Plan {
         resolutions: args.resolutions.clone(),
-        mode: args.mode.map_or(default_mode, Mode::from),
+        mode,
         strategies,
         cpu: !matches!(args.backend, BackendArg::Gpu),
         runs: args.repeat.get() as usize,
@@ -84,15 +83,27 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
     }
 }
 
+/// The mode asked for, or that of the paper's table: Rauwendaal's is of thin voxels.
+fn mode(args: &BenchArgs) -> Mode {
+    let default = match args.table {
+        Some(TableArg::Hcv) => Mode::Thin,
+        None => Mode::Conservative,
+    };
+    args.mode.map_or(default, Mode::from)
+}
+
 /// The strategies of the GPU that were asked for, or all.
-fn strategies(args: &BenchArgs) -> Vec<Strategy> {
+fn strategies(args: &BenchArgs, mode: Mode) -> Vec<Strategy> {
     let asked: Vec<Strategy> = args.strategy.iter().map(|&strategy| strategy.into()).collect();
     if let Some(other) = asked.iter().find(|strategy| !STRATEGIES.contains(strategy)) {
         usage(&format!(
             "--strategy chooses among the GPU's, and `{other}` is none; --backend cpu measures the processor"
         ));
     }
-    if asked.is_empty() { STRATEGIES.to_vec() } else { asked }
+    if let Some(other) = asked.iter().find(|strategy| !strategy.modes().contains(&mode)) {
+        usage(&format!("--strategy {other} has no mode {mode}"));
+    }
+    if asked.is_empty() { strategies_of(mode).collect() } else { asked }
 }
 
 /// Names and meshes.

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, CpuBackend, Job, Strategy, Volume};
+use trixel::{Backend, CpuBackend, Job, Mode, Strategy, Volume};
 use trixel_gpu::{
     AdapterChoice, Counters, Cutoff, Gpu, GpuError, GpuMesh, GpuVolume, Heuristic, Options, STRATEGIES, Voxelizer,
 };
@@ -55,6 +55,11 @@ impl Engine {
     pub(crate) fn check(method: &MethodArgs) {
         let strategy = Strategy::from(method.strategy);
         let of_gpu = STRATEGIES.contains(&strategy);
+        let mode = Mode::from(method.mode);
+        if !strategy.modes().contains(&mode) {
+            let modes: Vec<&str> = strategy.modes().iter().map(|mode| mode.name()).collect();
+            usage(&format!("--strategy {strategy} is for --mode {}, not for {mode}", modes.join(" or ")));
+        }
         if matches!(method.backend, BackendArg::Cpu) {
             if method.gpu.adapter.is_some() {
                 usage("--adapter names a GPU, but --backend cpu asks for the processor; leave one of them out");

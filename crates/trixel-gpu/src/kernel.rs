@@ -34,6 +34,12 @@ pub(crate) enum Kernel {
     WriteNodes,
     WriteBricks,
     Answer,
+    /// Whether columns with an odd number of boundary voxels are filled as well.
+    SwitchColumns {
+        uncorrected: bool,
+    },
+    CorrectXor,
+    CorrectMarch,
 }
 
 impl Kernel {
@@ -58,6 +64,10 @@ impl Kernel {
             Self::WriteNodes,
             Self::WriteBricks,
             Self::Answer,
+            Self::SwitchColumns { uncorrected: false },
+            Self::SwitchColumns { uncorrected: true },
+            Self::CorrectXor,
+            Self::CorrectMarch,
         ];
         others.into_iter().chain(sorting).collect()
     }
@@ -80,6 +90,9 @@ impl Kernel {
             Self::WriteNodes => "write_nodes",
             Self::WriteBricks => "write_bricks",
             Self::Answer => "answer",
+            Self::SwitchColumns { .. } => "switch_columns",
+            Self::CorrectXor => "correct_xor",
+            Self::CorrectMarch => "correct_march",
         }
     }
 
@@ -100,6 +113,7 @@ impl Kernel {
             Self::WriteNodes => shader!("numbering" "octree_nodes"),
             Self::WriteBricks => shader!("numbering" "entry" "sparse" "bricks"),
             Self::Answer => shader!("numbering" "entry" "octree_query"),
+            Self::SwitchColumns { .. } | Self::CorrectXor | Self::CorrectMarch => shader!("numbering" "fill_slices"),
         }
     }
 
@@ -109,6 +123,8 @@ impl Kernel {
             Self::CountDigits(order) | Self::MoveEntries(order) => {
                 format!("const ORDER: u32 = {}u;\n", u32::from(order == VoxelOrder::Morton))
             }
+            Self::SwitchColumns { uncorrected } => format!("const UNCORRECTED: bool = {uncorrected};\n"),
+            Self::CorrectXor | Self::CorrectMarch => "const UNCORRECTED: bool = false;\n".to_owned(),
             _ => String::new(),
         };
         [&[constants.as_str()], self.files()].concat().join("\n")

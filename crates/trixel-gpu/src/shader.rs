@@ -25,6 +25,8 @@ pub(crate) enum Stage {
     CountColumns,
     /// One invocation a pair of triangle and column.
     Balanced,
+    /// The number of slices that each triangle may meet.
+    CountSlices,
     /// Parity upwards.
     Fill,
     /// Bits to bytes.
@@ -46,6 +48,7 @@ impl Stage {
             Self::Classify { .. } => "classify",
             Self::CountColumns => "count_columns",
             Self::Balanced => "balanced",
+            Self::CountSlices => "count_slices",
             Self::Fill => "fill",
             Self::Expand => "expand",
             Self::ScanBlocks => "scan_blocks",
@@ -60,6 +63,7 @@ impl Stage {
             Self::TriangleParallel { .. } | Self::TriangleList { .. } | Self::Balanced | Self::Fill => true,
             Self::Classify { .. }
             | Self::CountColumns
+            | Self::CountSlices
             | Self::Expand
             | Self::ScanBlocks
             | Self::AddTotals
@@ -77,7 +81,10 @@ impl Stage {
             }
             Self::Classify { .. } => shader!("wide" "common" "triangle" "size" "look" "counters" "classify"),
             Self::CountColumns => shader!("wide" "common" "triangle" "look" "counters" "count_columns"),
-            Self::Balanced => shader!("wide" "common" "triangle" "column" "voxels" "counters" "balanced"),
+            Self::Balanced => shader!("wide" "common" "triangle" "column" "voxels" "counters" "pair" "balanced"),
+            Self::CountSlices => {
+                shader!("wide" "common" "triangle" "look" "counters" "slices_of" "count_slices")
+            }
             Self::Fill => shader!("common" "fill"),
             Self::Expand => shader!("expand"),
             Self::ScanBlocks | Self::AddTotals => shader!("scan"),
@@ -86,17 +93,49 @@ impl Stage {
     }
 }
 
-/// The rasterizer, over all triangles or a list of them.
+/// The rasterizer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Raster {
-    pub(crate) listed: bool,
+    pub(crate) drawn: Drawn,
     pub(crate) dilation: Dilation,
 }
 
+/// What the rasterizer draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Drawn {
+    /// All triangles.
+    All,
+    /// Those of a list.
+    Listed,
+    /// Each triangle once for each slice that it may meet.
+    Slices,
+    /// All triangles, in one slice.
+    Slice,
+}
+
 impl Raster {
-    pub(crate) const VERTEX_ENTRY_POINT: &str = "dilate";
-    pub(crate) const FRAGMENT_ENTRY_POINT: &str = "fragment_parallel";
-    const FILES: &[&str] = shader!("wide" "common" "triangle" "column" "voxels" "counters" "fragment_parallel");
+    /// The functions of the vertex and the fragment stage.
+    pub(crate) fn entry_points(self) -> [&'static str; 2] {
+        match self.drawn {
+            Drawn::All | Drawn::Listed => ["dilate", "fragment_parallel"],
+            Drawn::Slices => ["sliced", "slice"],
+            Drawn::Slice => ["slice_per_pass", "slice"],
+        }
+    }
+
+    fn files(self) -> &'static [&'static str] {
+        match self.drawn {
+            Drawn::All | Drawn::Listed => {
+                shader!("wide" "common" "triangle" "column" "voxels" "counters" "dilate" "fragment_parallel")
+            }
+            Drawn::Slices => shader!(
+                "wide" "common" "triangle" "column" "voxels" "counters" "dilate" "slices_of" "slice" "pair" "sliced"
+            ),
+            Drawn::Slice => shader!(
+                "wide" "common" "triangle" "column" "voxels" "counters" "dilate" "slices_of" "slice" "slice_per_pass"
+            ),
+        }
+    }
 }
 
 /// What a pipeline is specialized for.
@@ -151,7 +190,7 @@ pub(crate) fn source(stage: Stage, variant: Variant, tier: Tier, max_groups: u32
         Stage::Classify { heuristic } => constants += &format!("const HEURISTIC: u32 = {}u;\n", heuristic.code()),
         Stage::Arguments { vertices } => {
             constants += &format!("const VERTICES: u32 = {vertices}u;\nconst MAX_GROUPS: u32 = {max_groups}u;\n");
-            constants += &format!("const MAX_PAIRS: u32 = {MAX_PAIRS}u;\n");
+            constants += &format!("const MAX_PAIRS: u32 = {}u;\n", MAX_PAIRS / vertices.max(1));
         }
         _ => {}
     }
@@ -160,10 +199,10 @@ pub(crate) fn source(stage: Stage, variant: Variant, tier: Tier, max_groups: u32
 
 /// The WGSL of a vertex and a fragment stage.
 pub(crate) fn raster_source(raster: Raster, variant: Variant, tier: Tier) -> String {
-    let (listed, dilation) = (raster.listed, raster.dilation.code());
+    let (listed, dilation) = (raster.drawn == Drawn::Listed, raster.dilation.code());
     let constants =
         format!("const SMALL: bool = false;\nconst LISTED: bool = {listed};\nconst DILATION: u32 = {dilation}u;\n");
-    assemble(variant, tier, &constants, Raster::FILES, true)
+    assemble(variant, tier, &constants, raster.files(), true)
 }
 
 /// `writes` says whether voxels are written.
@@ -231,6 +270,7 @@ mod tests {
             Stage::TriangleList { small: true },
             Stage::CountColumns,
             Stage::Balanced,
+            Stage::CountSlices,
             Stage::Fill,
             Stage::Expand,
             Stage::ScanBlocks,
@@ -260,11 +300,11 @@ mod tests {
     #[test]
     fn every_raster_stage_is_valid() {
         for dilation in Dilation::ALL {
-            for listed in [false, true] {
+            for drawn in [Drawn::All, Drawn::Listed, Drawn::Slices, Drawn::Slice] {
                 for variant in VARIANTS {
                     for tier in Tier::ALL {
-                        let source = raster_source(Raster { listed, dilation }, variant, tier);
-                        assert_valid(&source, tier, &[Raster::VERTEX_ENTRY_POINT, Raster::FRAGMENT_ENTRY_POINT]);
+                        let raster = Raster { drawn, dilation };
+                        assert_valid(&raster_source(raster, variant, tier), tier, &raster.entry_points());
                     }
                 }
             }
