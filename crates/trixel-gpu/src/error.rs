@@ -159,6 +159,12 @@ pub enum GpuError {
     /// More pairs of triangle and column than 32 bits count.
     #[error("`balanced` would need more than 2^32 invocations for this mesh and grid; use `hybrid`")]
     TooManyColumns,
+    /// A strategy whose fragments claim no voxels.
+    #[error(
+        "strategy `{0}` writes no 3D textures itself; use `sliced` or `slice-per-pass`, or make them from its voxels with \
+         `MaterialVolume::from_attributes`"
+    )]
+    NoClaims(trixel::Strategy),
     /// More copies of triangles than 32 bits number the vertices of.
     #[error("`sliced` would draw more than 2^32 vertices for this mesh, grid and overlap; use `hybrid`")]
     TooManySlices,

@@ -19,14 +19,8 @@ impl GpuVolume {
     pub fn filled(&self, gpu: &Gpu, fill: Fill) -> Result<(Self, FillReport), GpuError> {
         let [nx, ny, nz] = self.grid().dims();
         let filled = Self::new(gpu, *self.grid())?;
-        let ([boundary], [into]) = (self.slabs(), filled.slabs()) else {
-            return Err(GpuError::BindingTooSmall {
-                adapter: gpu.info().to_string(),
-                what: "the voxels to fill",
-                needed: self.slabs().iter().map(|slab| self.slab_bytes(slab)).sum(),
-                limit: gpu.limits().binding_bytes,
-            });
-        };
+        let [boundary, into] = [self, &filled].map(|volume| volume.whole(gpu, "the voxels to fill"));
+        let (boundary, into) = (boundary?, into?);
         let columns = nx * ny;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let states = gpu.storage("the columns to fill", u64::from(columns) * 4, usage)?;

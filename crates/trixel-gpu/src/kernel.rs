@@ -10,6 +10,7 @@ use trixel::VoxelOrder;
 use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::limits::WORKGROUP;
+use crate::material_volume::Precision;
 use crate::shader::shader;
 
 /// A function of a shader, with the constants in front of it.
@@ -40,6 +41,11 @@ pub(crate) enum Kernel {
     },
     CorrectXor,
     CorrectMarch,
+    /// To texels of a precision, with what is inside if it was filled.
+    ResolveClaims {
+        precision: Precision,
+        filled: bool,
+    },
 }
 
 impl Kernel {
@@ -69,7 +75,10 @@ impl Kernel {
             Self::CorrectXor,
             Self::CorrectMarch,
         ];
-        others.into_iter().chain(sorting).collect()
+        let resolving = Precision::ALL
+            .into_iter()
+            .flat_map(|precision| [false, true].map(|filled| Self::ResolveClaims { precision, filled }));
+        others.into_iter().chain(sorting).chain(resolving).collect()
     }
 
     pub(crate) fn entry_point(self) -> &'static str {
@@ -93,6 +102,7 @@ impl Kernel {
             Self::SwitchColumns { .. } => "switch_columns",
             Self::CorrectXor => "correct_xor",
             Self::CorrectMarch => "correct_march",
+            Self::ResolveClaims { .. } => "resolve_claims",
         }
     }
 
@@ -114,6 +124,7 @@ impl Kernel {
             Self::WriteBricks => shader!("numbering" "entry" "sparse" "bricks"),
             Self::Answer => shader!("numbering" "entry" "octree_query"),
             Self::SwitchColumns { .. } | Self::CorrectXor | Self::CorrectMarch => shader!("numbering" "fill_slices"),
+            Self::ResolveClaims { .. } => shader!("numbering" "resolve_claims"),
         }
     }
 
@@ -125,6 +136,10 @@ impl Kernel {
             }
             Self::SwitchColumns { uncorrected } => format!("const UNCORRECTED: bool = {uncorrected};\n"),
             Self::CorrectXor | Self::CorrectMarch => "const UNCORRECTED: bool = false;\n".to_owned(),
+            Self::ResolveClaims { precision, filled } => format!(
+                "alias Texels = texture_storage_3d<{}, write>;\nconst FILLED: bool = {filled};\n",
+                precision.wgsl_format()
+            ),
             _ => String::new(),
         };
         [&[constants.as_str()], self.files()].concat().join("\n")
@@ -160,6 +175,7 @@ pub(crate) enum Bound<'a> {
     /// Words of a uniform.
     Words(&'a [u32]),
     Buffer(&'a wgpu::Buffer),
+    Texture(&'a wgpu::TextureView),
 }
 
 /// Records dispatches, one pass each, and submits them.
@@ -195,7 +211,7 @@ impl<'a> Dispatcher<'a> {
                     bytes.resize(bytes.len().next_multiple_of(16), 0);
                     self.gpu.buffer_with("trixel kernel parameters", &bytes, wgpu::BufferUsages::UNIFORM).map(Some)
                 }
-                Bound::Buffer(_) => Ok(None),
+                Bound::Buffer(_) | Bound::Texture(_) => Ok(None),
             })
             .collect::<Result<Vec<_>, GpuError>>()?;
         let gpu = self.gpu;
@@ -205,11 +221,12 @@ impl<'a> Dispatcher<'a> {
                 .iter()
                 .zip(&uniforms)
                 .filter_map(|((binding, bound), uniform)| {
-                    let buffer = match bound {
-                        Bound::Words(_) => uniform.as_ref()?,
-                        Bound::Buffer(buffer) => buffer,
+                    let resource = match bound {
+                        Bound::Words(_) => uniform.as_ref()?.as_entire_binding(),
+                        Bound::Buffer(buffer) => buffer.as_entire_binding(),
+                        Bound::Texture(view) => wgpu::BindingResource::TextureView(view),
                     };
-                    Some(wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() })
+                    Some(wgpu::BindGroupEntry { binding: *binding, resource })
                 })
                 .collect();
             let layout = pipeline.get_bind_group_layout(0);

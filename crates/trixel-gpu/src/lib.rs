@@ -44,7 +44,7 @@ pub use error::GpuError;
 pub use gpu::Gpu;
 pub use limits::MAX_EXTENT;
 pub use lists::{GpuVoxelList, ListMethod, UnknownListMethod};
-pub use material_volume::{Decoding, MaterialTexels, MaterialVolume, Media, Medium, Precision, VoxelMaterial};
+pub use material_volume::{Decoding, MaterialTexels, MaterialVolume, Media, Medium, Precision, Slicing, VoxelMaterial};
 pub use mesh::GpuMesh;
 pub use sparse::{GpuBrickMap, GpuOctree};
 pub use tier::Tier;

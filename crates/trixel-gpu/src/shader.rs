@@ -155,19 +155,28 @@ pub(crate) enum Sink {
     List,
     /// To a list alone, once for every triangle.
     Fragments,
+    /// To the bits, and to a buffer that knows the lowest triangle of each voxel; strategies of slices alone do that.
+    Claims,
 }
 
 impl Sink {
     fn code(self) -> u32 {
         match self {
-            Self::Bits => 0,
+            Self::Bits | Self::Claims => 0,
             Self::List => 1,
             Self::Fragments => 2,
         }
     }
 
     fn files(self) -> &'static [&'static str] {
-        if self == Self::Bits { shader!("entry" "no_append") } else { shader!("entry" "append") }
+        match self {
+            Self::Bits | Self::Claims => shader!("entry" "no_append"),
+            Self::List | Self::Fragments => shader!("entry" "append"),
+        }
+    }
+
+    fn claiming_files(self) -> &'static [&'static str] {
+        if self == Self::Claims { shader!("claim") } else { shader!("no_claim") }
     }
 }
 
@@ -202,7 +211,11 @@ pub(crate) fn raster_source(raster: Raster, variant: Variant, tier: Tier) -> Str
     let (listed, dilation) = (raster.drawn == Drawn::Listed, raster.dilation.code());
     let constants =
         format!("const SMALL: bool = false;\nconst LISTED: bool = {listed};\nconst DILATION: u32 = {dilation}u;\n");
-    assemble(variant, tier, &constants, raster.files(), true)
+    let claiming = match raster.drawn {
+        Drawn::All | Drawn::Listed => &[],
+        Drawn::Slices | Drawn::Slice => variant.sink.claiming_files(),
+    };
+    assemble(variant, tier, &constants, &[raster.files(), claiming].concat(), true)
 }
 
 /// `writes` says whether voxels are written.
@@ -233,7 +246,7 @@ mod tests {
     use super::*;
     use crate::kernel::Kernel;
 
-    const SINKS: [Sink; 4] = [Sink::Bits, Sink::List, Sink::Fragments, Sink::Bits];
+    const SINKS: [Sink; 4] = [Sink::Bits, Sink::List, Sink::Fragments, Sink::Claims];
 
     /// Every mode with every sink, half of them counting.
     const VARIANTS: [Variant; 16] = {

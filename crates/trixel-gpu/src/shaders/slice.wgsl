@@ -4,9 +4,11 @@
 // fragment and floats the depth, so that nothing is lost; the fragment stage decides exactly.
 
 // A corner of a triangle's copy for a slice.
-fn slice_corner(shape: Shape, corner: u32, slice: i32) -> Varyings {
+fn slice_corner(triangle: u32, shape: Shape, corner: u32, slice: i32) -> Varyings {
     let t = triangle_of(shape);
     var v = pack(t);
+    // Modes that look along z leave these free.
+    v.low.z = params.first_triangle + triangle;
     v.low.w = bitcast<u32>(slice);
     let at = dilated(t, corner);
     // The voxel's centre is half a voxel above the lower of the two bounds, but for the overlap.
@@ -21,7 +23,7 @@ fn slice_corner(shape: Shape, corner: u32, slice: i32) -> Varyings {
 }
 
 // Sets the voxel of column (a, b) in a slice if the triangle meets the column's line there.
-fn voxelize_in_slice(t: Triangle, a: i32, b: i32, slice: i32) -> bool {
+fn voxelize_in_slice(t: Triangle, triangle: u32, a: i32, b: i32, slice: i32) -> bool {
     count_column();
     if !ab_pass(t, a, b) {
         return false;
@@ -31,7 +33,9 @@ fn voxelize_in_slice(t: Triangle, a: i32, b: i32, slice: i32) -> bool {
     if range.x > range.y {
         return false;
     }
-    set_bits(t.base.xy + vec2<i32>(a, b), slice, 1u);
+    let column = t.base.xy + vec2<i32>(a, b);
+    set_bits(column, slice, 1u);
+    claim(vec3<i32>(column, slice), triangle);
     return true;
 }
 
@@ -46,7 +50,7 @@ fn slice(v: Varyings) -> @location(0) vec4<f32> {
     let rect = column_rect(t.base, t.extent, 2u);
     var passed = false;
     if all(column >= rect.xy) && all(column <= rect.zw) {
-        passed = voxelize_in_slice(t, column.x, column.y, bitcast<i32>(v.low.w));
+        passed = voxelize_in_slice(t, v.low.z, column.x, column.y, bitcast<i32>(v.low.w));
     }
     if COUNTING {
         count(COUNT_FRAGMENTS, 1u);

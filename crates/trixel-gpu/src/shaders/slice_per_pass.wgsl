@@ -16,7 +16,8 @@ fn no_corner() -> Varyings {
 
 @vertex
 fn slice_per_pass(@builtin(vertex_index) index: u32) -> Varyings {
-    let shape = shape_of(corners(index / VERTICES));
+    let triangle = index / VERTICES;
+    let shape = shape_of(corners(triangle));
     if (shape.flags & TOO_LARGE) != 0u {
         // One pixel of the first slice, whose fragment tells.
         var tell: Varyings;
@@ -30,5 +31,5 @@ fn slice_per_pass(@builtin(vertex_index) index: u32) -> Varyings {
     if one.index < slices.x || one.index > slices.y {
         return no_corner();
     }
-    return slice_corner(shape, index % VERTICES, one.index);
+    return slice_corner(triangle, shape, index % VERTICES, one.index);
 }

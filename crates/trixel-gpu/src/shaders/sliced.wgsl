@@ -7,5 +7,5 @@ fn sliced(@builtin(vertex_index) index: u32) -> Varyings {
     let triangle = triangle_of_pair(pair);
     let shape = shape_of(corners(triangle));
     let slice = slices_of(shape).x + i32(pair - before[triangle]);
-    return slice_corner(shape, index % VERTICES, slice);
+    return slice_corner(triangle, shape, index % VERTICES, slice);
 }
