@@ -25,6 +25,7 @@ fn colored_by_place(scene: &str) -> Mesh {
     #[expect(clippy::cast_possible_truncation, reason = "colours are f32")]
     let colors = mesh.positions.iter().map(|p| [p[0] as f32, p[1] as f32, p[2] as f32, 1.0]).collect();
     mesh.colors = Some(Attribute::per_vertex(colors));
+    mesh.materials.clear();
     mesh
 }
 
