@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use anyhow::Result;
+use trixel::fill::{Fill, FillReport};
 use trixel::lattice::LatticeMesh;
 use trixel::{Backend, CpuBackend, Job, Mode, Strategy, Volume};
 use trixel_gpu::{
@@ -38,9 +39,19 @@ pub(crate) struct Ran {
     pub(crate) upload_ms: Option<f64>,
     pub(crate) samples_ms: Vec<f64>,
     pub(crate) download_ms: Option<f64>,
+    /// What became of the columns that were filled.
+    pub(crate) fill: Option<FillReport>,
 }
 
 impl Engine {
+    /// The mode that is voxelized before anything is filled.
+    fn voxelized_mode(method: &MethodArgs) -> Mode {
+        match method.fill.into() {
+            Fill::Parity => method.mode.into(),
+            Fill::Xor | Fill::March => Mode::Sliced,
+        }
+    }
+
     /// Whether the arguments ask for a GPU by name.
     fn is_gpu_named(method: &MethodArgs) -> bool {
         matches!(method.backend, BackendArg::Gpu) || method.gpu.adapter.is_some()
@@ -55,7 +66,7 @@ impl Engine {
     pub(crate) fn check(method: &MethodArgs) {
         let strategy = Strategy::from(method.strategy);
         let of_gpu = STRATEGIES.contains(&strategy);
-        let mode = Mode::from(method.mode);
+        let mode = Self::voxelized_mode(method);
         if !strategy.modes().contains(&mode) {
             let modes: Vec<&str> = strategy.modes().iter().map(|mode| mode.name()).collect();
             usage(&format!("--strategy {strategy} is for --mode {}, not for {mode}", modes.join(" or ")));
@@ -116,22 +127,23 @@ impl Engine {
         matches!(self, Self::Cpu | Self::Gpu { cpu_may_help: true, .. })
     }
 
-    /// Voxelizes `repeat` times.
+    /// Voxelizes, and fills where the inside is not found by parity, `repeat` times.
     pub(crate) fn run(
         &self,
         mesh: &LatticeMesh<'_>,
         job: &Job,
+        fill: Fill,
         volume: &mut Volume,
         repeat: u32,
         reporter: &Reporter,
     ) -> Result<Ran> {
         match self {
-            Self::Cpu => run_on_cpu(mesh, job, volume, repeat, reporter),
+            Self::Cpu => run_on_cpu(mesh, job, fill, volume, repeat, reporter),
             Self::Gpu { gpu, options, cpu_may_help } => {
-                match run_on_gpu(gpu, options, mesh, job, volume, repeat, reporter) {
+                match run_on_gpu(gpu, options, mesh, job, fill, volume, repeat, reporter) {
                     Err(error) if *cpu_may_help => {
                         reporter.warn(format!("{error}; the processor computes instead"));
-                        run_on_cpu(mesh, job, volume, repeat, reporter)
+                        run_on_cpu(mesh, job, fill, volume, repeat, reporter)
                     }
                     ran => Ok(ran?),
                 }
@@ -140,8 +152,29 @@ impl Engine {
     }
 }
 
-fn run_on_cpu(mesh: &LatticeMesh<'_>, job: &Job, volume: &mut Volume, repeat: u32, reporter: &Reporter) -> Result<Ran> {
-    on_cpu(repeat, reporter, || CpuBackend::default().voxelize(mesh, job, volume))
+/// The job of the voxels that are filled: none where a solid's own job finds the inside.
+fn boundary_job(job: &Job, fill: Fill) -> Option<Job> {
+    (fill != Fill::Parity).then(|| Job::new(*job.grid(), Mode::Sliced).with_strategy(job.strategy()))
+}
+
+fn run_on_cpu(
+    mesh: &LatticeMesh<'_>,
+    job: &Job,
+    fill: Fill,
+    volume: &mut Volume,
+    repeat: u32,
+    reporter: &Reporter,
+) -> Result<Ran> {
+    let mut report = None;
+    let ran = on_cpu(repeat, reporter, || {
+        let Some(boundary) = boundary_job(job, fill) else { return CpuBackend::default().voxelize(mesh, job, volume) };
+        let strategy = CpuBackend::default().voxelize(mesh, &boundary, volume)?;
+        let (filled, filling) = trixel::fill::fill(volume, fill)?;
+        *volume = filled;
+        report = Some(filling);
+        Ok(strategy)
+    })?;
+    Ok(Ran { fill: report, ..ran })
 }
 
 /// Runs a voxelization on the CPU `repeat` times.
@@ -168,6 +201,7 @@ pub(crate) fn on_cpu(
         upload_ms: None,
         samples_ms,
         download_ms: None,
+        fill: None,
     })
 }
 
@@ -176,19 +210,31 @@ fn run_on_gpu(
     options: &Options,
     mesh: &LatticeMesh<'_>,
     job: &Job,
+    fill: Fill,
     volume: &mut Volume,
     repeat: u32,
     reporter: &Reporter,
 ) -> Result<Ran, GpuError> {
+    let boundary = boundary_job(job, fill);
+    let job = boundary.as_ref().unwrap_or(job);
     let (voxelizer, check_ms) =
         reporter.stage("checking the GPU and building its pipelines", || Voxelizer::new(gpu, job, options));
     let mut voxelizer = voxelizer?;
     let (on_gpu, upload_ms) = reporter.stage("uploading", || GpuMesh::upload(gpu, mesh));
     let on_gpu = on_gpu?;
-    let voxels = GpuVolume::new(gpu, *job.grid())?;
+    let mut voxels = GpuVolume::new(gpu, *job.grid())?;
+    let mut report = None;
     let mut samples_ms = vec![];
     for _ in 0..repeat {
-        let (ran, ms) = reporter.stage("voxelizing", || voxelizer.run(&on_gpu, &voxels));
+        let (ran, ms) = reporter.stage("voxelizing", || -> Result<(), GpuError> {
+            voxelizer.run(&on_gpu, &voxels)?;
+            if boundary.is_some() {
+                let (filled, filling) = voxels.filled(gpu, fill)?;
+                voxels = filled;
+                report = Some(filling);
+            }
+            Ok(())
+        });
         ran?;
         samples_ms.push(ms);
     }
@@ -209,5 +255,6 @@ fn run_on_gpu(
         upload_ms: Some(upload_ms),
         samples_ms,
         download_ms: Some(start.elapsed().as_secs_f64() * 1e3),
+        fill: report,
     })
 }

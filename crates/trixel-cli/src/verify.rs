@@ -31,7 +31,14 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<ExitCode> {
     let (expected, _) = reporter.stage("voxelizing", || -> Result<Volume> {
         let lattice = LatticeMesh::snap(&mesh, job.grid()).with_context_of(&args.mesh)?;
         let mut volume = allocate(&job)?;
-        Engine::open(&args.method, &reporter)?.run(&lattice, &job, &mut volume, 1, &reporter)?;
+        Engine::open(&args.method, &reporter)?.run(
+            &lattice,
+            &job,
+            args.method.fill.into(),
+            &mut volume,
+            1,
+            &reporter,
+        )?;
         Ok(volume)
     });
     let expected = expected?;

@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use anyhow::{Result, bail};
 use trixel::attributes::{Described, compute};
+use trixel::fill::{Fill, FillReport};
 use trixel::lattice::LatticeMesh;
 use trixel::{Bytes, Job, Mode, Rank, Topology, Volume};
 use trixel_io::VolumeFormat;
@@ -18,7 +19,7 @@ use crate::args::{MethodArgs, VoxelizeArgs};
 use crate::engine::Engine;
 use crate::grid::{GridRequest, usage};
 use crate::progress::Reporter;
-use crate::report::{AttributesReport, GridReport, MeshReport, Report, Samples, Stages, median};
+use crate::report::{AttributesReport, FillRecord, GridReport, MeshReport, Report, Samples, Stages, median};
 use crate::voxels::Voxels;
 use crate::{attributes, memory, mesh, out_of_core, volume};
 
@@ -86,7 +87,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let mut voxels = voxels?;
     stages.allocate = allocate_ms;
 
-    let ran = voxels.fill(&engine, &lattice, &job, args.repeat.get(), &reporter)?;
+    let ran = voxels.fill(&engine, &lattice, &job, args.method.fill.into(), args.repeat.get(), &reporter)?;
     stages.open = ran.check_ms.map(|check_ms| open_ms + check_ms);
     stages.upload = ran.upload_ms;
     stages.download = ran.download_ms;
@@ -114,6 +115,13 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let triangles = loaded.triangles.len();
     drop(loaded);
 
+    if let Some(FillReport { questionable, uncorrected }) = ran.fill {
+        reporter.say(&format!(
+            "filled between slices ({}): {questionable} columns were questionable, {uncorrected} of them past correction; \
+             `trixel verify --mode solid` lists what differs from the exact solid",
+            Fill::from(args.method.fill)
+        ));
+    }
     let count = voxels.count();
     if count == 0 {
         reporter.warn(empty_hint(job.mode()));
@@ -151,6 +159,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
             grid: GridReport::from(job.grid()),
             mode: job.mode().name(),
             overlap: args.method.overlap,
+            fill: FillRecord::new(&job, args.method.fill.into(), ran.fill),
             backend: ran.backend,
             strategy: ran.strategy.name(),
             threads: rayon::current_num_threads(),
@@ -230,6 +239,9 @@ pub(crate) fn set_threads(threads: Option<u32>) -> Result<()> {
 pub(crate) fn check_method(method: &MethodArgs) {
     if method.overlap != 0.0 && Mode::from(method.mode) != Mode::Sliced {
         usage("--overlap only means something with --mode sliced");
+    }
+    if Fill::from(method.fill) != Fill::Parity && Mode::from(method.mode) != Mode::Solid {
+        usage("--fill only means something with --mode solid");
     }
     Engine::check(method);
 }

@@ -134,8 +134,23 @@ fn correct_xor(
     atomicStore(&good_since[column], volume.pass_number);
 }
 
-// Figure 3's low-pass filter: a questionable column is as thick as the good ones around it in the mean, from its first
-// boundary voxel on.
+// The first boundary voxel of a column, or QUESTIONABLE.
+fn first_of(column: u32) -> u32 {
+    for (var i = 0u; i < volume.column_words; i++) {
+        let word = boundary[column * volume.column_words + i];
+        if word != 0u {
+            return 32u * i + firstTrailingBit(word);
+        }
+    }
+    return QUESTIONABLE;
+}
+
+fn mean(sum: u32, count: u32) -> u32 {
+    return (2u * sum + count) / (2u * count);
+}
+
+// Figure 3's low-pass filter: a questionable column is as thick as the good ones around it in the mean, and begins where
+// these do in the mean.
 @compute @workgroup_size(WORKGROUP)
 fn correct_march(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -148,6 +163,8 @@ fn correct_march(
     }
     var sum = 0u;
     var count = 0u;
+    var firsts = 0u;
+    var entered = 0u;
     for (var k = 0u; k < 8u; k++) {
         let other = neighbour(column, k);
         if other != QUESTIONABLE && atomicLoad(&good_since[other]) == 0u {
@@ -155,21 +172,22 @@ fn correct_march(
                 sum += countOneBits(filled[other * volume.column_words + i]);
             }
             count++;
+            let first = first_of(other);
+            if first != QUESTIONABLE {
+                firsts += first;
+                entered++;
+            }
         }
     }
     if count == 0u {
         return;
     }
     let start = column * volume.column_words;
-    var first = 0u;
-    for (var i = 0u; i < volume.column_words; i++) {
-        let word = boundary[start + i];
-        if word != 0u {
-            first = 32u * i + firstTrailingBit(word);
-            break;
-        }
+    var first = first_of(column);
+    if entered > 0u {
+        first = mean(firsts, entered);
     }
-    let end = min(first + (2u * sum + count) / (2u * count), volume.nz);
+    let end = min(first + mean(sum, count), volume.nz);
     for (var i = 0u; i < volume.column_words; i++) {
         let at = 32u * i;
         filled[start + i] = below(end - min(at, end)) & ~below(first - min(at, first));

@@ -9,8 +9,9 @@
 //!   [`XOR_PASSES`] passes, a questionable column next to good ones takes in every slice what most of these have. It is good
 //!   from the next pass on.
 //! - [`Fill::March`]: figure 3's ray, one along every column: the slices inside are added up to a thickness. A questionable
-//!   column gets the mean of the thicknesses around it, and is filled so far from its first boundary voxel on. Only the
-//!   column itself and its neighbours are looked at, so that a renderer can do it on the fly.
+//!   column gets the mean of the thicknesses around it. The paper stops there; as voxels, it is filled so far from the mean
+//!   of its neighbours' first boundary voxels on (of those that have any, else its own). Only the column itself and its
+//!   neighbours are looked at, so that a renderer can do it on the fly.
 //!
 //! As in figure 3, the boundary voxel where a column enters is inside and the one where it leaves is not. A column without
 //! boundary voxels is outside, though the figure has it questionable. A questionable column without good neighbours keeps its

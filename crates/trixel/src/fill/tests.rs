@@ -71,15 +71,22 @@ fn wide_holes_are_repaired_from_their_rim_inwards() {
 
 #[test]
 fn thickness_is_the_mean_of_good_neighbours() {
-    // Neighbours 20 and 31 thick: 25.5 is rounded up.
-    let top = [20, 0, 31];
-    let boundary = volume([3, 1, 90], |[x, _, z]| z == 30 || top[x as usize] > 0 && z == 30 + top[x as usize]);
+    // Neighbours from 30 and 33 on, 20 and 31 thick: 31.5 and 25.5 are rounded up. The column itself lacks its first voxel.
+    let set = [[30, 50], [58, 58], [33, 64]];
+    let boundary = volume([3, 1, 90], |[x, _, z]| set[x as usize].contains(&z));
     let (filled, _) = fill(&boundary, Fill::March).unwrap();
-    assert!((0..90).all(|z| filled.get([1, 0, z]) == (30..56).contains(&z)));
+    assert!((0..90).all(|z| filled.get([1, 0, z]) == (32..58).contains(&z)));
     // The border of the grid ends it.
-    let boundary = volume([2, 1, 90], |[x, _, z]| if x == 0 { z == 0 || z == 60 } else { z == 65 });
+    let boundary = volume([2, 1, 90], |[x, _, z]| if x == 0 { [2, 9, 40, 88].contains(&z) } else { z == 65 });
     let (filled, _) = fill(&boundary, Fill::March).unwrap();
-    assert!((0..90).all(|z| filled.get([1, 0, z]) == (65..90).contains(&z)));
+    assert!((0..90).all(|z| filled.get([1, 0, z]) == (2..57).contains(&z)));
+    let boundary = volume([2, 1, 90], |[x, _, z]| if x == 0 { (60..70).contains(&z) } else { z == 65 });
+    let (filled, _) = fill(&boundary, Fill::March).unwrap();
+    assert!((0..90).all(|z| filled.get([1, 0, z]) == (60..65).contains(&z)));
+    // Without neighbours that have any, the mean is nothing.
+    let boundary = volume([2, 1, 90], |[x, _, z]| x == 1 && z == 65);
+    let (filled, report) = fill(&boundary, Fill::March).unwrap();
+    assert_eq!((filled.count(), report), (0, FillReport { questionable: 1, uncorrected: 0 }));
 }
 
 #[test]
