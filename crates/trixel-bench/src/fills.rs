@@ -143,7 +143,6 @@ mod tests {
     use super::*;
 
     #[test]
-    #[expect(clippy::unwrap_used, clippy::panic, reason = "a failure here is a failed test")]
     fn holes_are_mostly_corrected() {
         let mut table = Fills::default();
         table.count("torus", &trixel::scene::build("torus").unwrap(), 45).unwrap();

@@ -27,6 +27,23 @@ pub(crate) enum Engine {
     },
 }
 
+/// What to run.
+#[derive(Clone, Copy)]
+pub(crate) struct Task<'a> {
+    pub(crate) job: &'a Job,
+    /// How a solid's inside is found.
+    pub(crate) fill: Fill,
+    /// How many times; what is measured is all of them.
+    pub(crate) repeat: u32,
+}
+
+impl Task<'_> {
+    /// The job of the voxels that are filled; none where a solid's own job finds the inside.
+    fn boundary(&self) -> Option<Job> {
+        (self.fill != Fill::Parity).then(|| Job::new(*self.job.grid(), Mode::Sliced).with_strategy(self.job.strategy()))
+    }
+}
+
 /// What a run did.
 pub(crate) struct Ran {
     pub(crate) backend: &'static str,
@@ -127,49 +144,33 @@ impl Engine {
         matches!(self, Self::Cpu | Self::Gpu { cpu_may_help: true, .. })
     }
 
-    /// Voxelizes, and fills where the inside is not found by parity, `repeat` times.
+    /// Voxelizes, and fills where the inside is not found by parity.
     pub(crate) fn run(
         &self,
         mesh: &LatticeMesh<'_>,
-        job: &Job,
-        fill: Fill,
+        task: Task<'_>,
         volume: &mut Volume,
-        repeat: u32,
         reporter: &Reporter,
     ) -> Result<Ran> {
         match self {
-            Self::Cpu => run_on_cpu(mesh, job, fill, volume, repeat, reporter),
-            Self::Gpu { gpu, options, cpu_may_help } => {
-                match run_on_gpu(gpu, options, mesh, job, fill, volume, repeat, reporter) {
-                    Err(error) if *cpu_may_help => {
-                        reporter.warn(format!("{error}; the processor computes instead"));
-                        run_on_cpu(mesh, job, fill, volume, repeat, reporter)
-                    }
-                    ran => Ok(ran?),
+            Self::Cpu => run_on_cpu(mesh, task, volume, reporter),
+            Self::Gpu { gpu, options, cpu_may_help } => match run_on_gpu(gpu, options, mesh, task, volume, reporter) {
+                Err(error) if *cpu_may_help => {
+                    reporter.warn(format!("{error}; the processor computes instead"));
+                    run_on_cpu(mesh, task, volume, reporter)
                 }
-            }
+                ran => Ok(ran?),
+            },
         }
     }
 }
 
-/// The job of the voxels that are filled: none where a solid's own job finds the inside.
-fn boundary_job(job: &Job, fill: Fill) -> Option<Job> {
-    (fill != Fill::Parity).then(|| Job::new(*job.grid(), Mode::Sliced).with_strategy(job.strategy()))
-}
-
-fn run_on_cpu(
-    mesh: &LatticeMesh<'_>,
-    job: &Job,
-    fill: Fill,
-    volume: &mut Volume,
-    repeat: u32,
-    reporter: &Reporter,
-) -> Result<Ran> {
+fn run_on_cpu(mesh: &LatticeMesh<'_>, task: Task<'_>, volume: &mut Volume, reporter: &Reporter) -> Result<Ran> {
     let mut report = None;
-    let ran = on_cpu(repeat, reporter, || {
-        let Some(boundary) = boundary_job(job, fill) else { return CpuBackend::default().voxelize(mesh, job, volume) };
+    let ran = on_cpu(task.repeat, reporter, || {
+        let Some(boundary) = task.boundary() else { return CpuBackend::default().voxelize(mesh, task.job, volume) };
         let strategy = CpuBackend::default().voxelize(mesh, &boundary, volume)?;
-        let (filled, filling) = trixel::fill::fill(volume, fill)?;
+        let (filled, filling) = trixel::fill::fill(volume, task.fill)?;
         *volume = filled;
         report = Some(filling);
         Ok(strategy)
@@ -209,14 +210,12 @@ fn run_on_gpu(
     gpu: &Gpu,
     options: &Options,
     mesh: &LatticeMesh<'_>,
-    job: &Job,
-    fill: Fill,
+    task: Task<'_>,
     volume: &mut Volume,
-    repeat: u32,
     reporter: &Reporter,
 ) -> Result<Ran, GpuError> {
-    let boundary = boundary_job(job, fill);
-    let job = boundary.as_ref().unwrap_or(job);
+    let boundary = task.boundary();
+    let job = boundary.as_ref().unwrap_or(task.job);
     let (voxelizer, check_ms) =
         reporter.stage("checking the GPU and building its pipelines", || Voxelizer::new(gpu, job, options));
     let mut voxelizer = voxelizer?;
@@ -225,11 +224,11 @@ fn run_on_gpu(
     let mut voxels = GpuVolume::new(gpu, *job.grid())?;
     let mut report = None;
     let mut samples_ms = vec![];
-    for _ in 0..repeat {
+    for _ in 0..task.repeat {
         let (ran, ms) = reporter.stage("voxelizing", || -> Result<(), GpuError> {
             voxelizer.run(&on_gpu, &voxels)?;
             if boundary.is_some() {
-                let (filled, filling) = voxels.filled(gpu, fill)?;
+                let (filled, filling) = voxels.filled(gpu, task.fill)?;
                 voxels = filled;
                 report = Some(filling);
             }

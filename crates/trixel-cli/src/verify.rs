@@ -9,7 +9,7 @@ use trixel::{Mode, Topology, Volume};
 use trixel_io::volume_read::read_volume;
 
 use crate::args::VerifyArgs;
-use crate::engine::Engine;
+use crate::engine::{Engine, Task};
 use crate::progress::Reporter;
 use crate::voxelize::{ContextOf, allocate, check_method, job, set_threads, warn_if_open};
 use crate::{memory, mesh};
@@ -31,14 +31,8 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<ExitCode> {
     let (expected, _) = reporter.stage("voxelizing", || -> Result<Volume> {
         let lattice = LatticeMesh::snap(&mesh, job.grid()).with_context_of(&args.mesh)?;
         let mut volume = allocate(&job)?;
-        Engine::open(&args.method, &reporter)?.run(
-            &lattice,
-            &job,
-            args.method.fill.into(),
-            &mut volume,
-            1,
-            &reporter,
-        )?;
+        let task = Task { job: &job, fill: args.method.fill.into(), repeat: 1 };
+        Engine::open(&args.method, &reporter)?.run(&lattice, task, &mut volume, &reporter)?;
         Ok(volume)
     });
     let expected = expected?;

@@ -16,7 +16,7 @@ use trixel_io::textures::decode_textures;
 use trixel_io::write::WriteOptions;
 
 use crate::args::{MethodArgs, VoxelizeArgs};
-use crate::engine::Engine;
+use crate::engine::{Engine, Task};
 use crate::grid::{GridRequest, usage};
 use crate::progress::Reporter;
 use crate::report::{AttributesReport, FillRecord, GridReport, MeshReport, Report, Samples, Stages, median};
@@ -87,7 +87,8 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let mut voxels = voxels?;
     stages.allocate = allocate_ms;
 
-    let ran = voxels.fill(&engine, &lattice, &job, args.method.fill.into(), args.repeat.get(), &reporter)?;
+    let task = Task { job: &job, fill: args.method.fill.into(), repeat: args.repeat.get() };
+    let ran = voxels.fill(&engine, &lattice, task, &reporter)?;
     stages.open = ran.check_ms.map(|check_ms| open_ms + check_ms);
     stages.upload = ran.upload_ms;
     stages.download = ran.download_ms;
@@ -119,7 +120,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
         reporter.say(&format!(
             "filled between slices ({}): {questionable} columns were questionable, {uncorrected} of them past correction; \
              `trixel verify --mode solid` lists what differs from the exact solid",
-            Fill::from(args.method.fill)
+            task.fill
         ));
     }
     let count = voxels.count();
@@ -159,7 +160,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
             grid: GridReport::from(job.grid()),
             mode: job.mode().name(),
             overlap: args.method.overlap,
-            fill: FillRecord::new(&job, args.method.fill.into(), ran.fill),
+            fill: FillRecord::new(&job, task.fill, ran.fill),
             backend: ran.backend,
             strategy: ran.strategy.name(),
             threads: rayon::current_num_threads(),

@@ -11,7 +11,7 @@ use trixel_io::atomic_file::Staged;
 use trixel_io::write::{WriteOptions, write_bricks};
 
 use crate::args::VoxelizeArgs;
-use crate::engine::{self, Engine, Ran};
+use crate::engine::{self, Engine, Ran, Task};
 use crate::progress::Reporter;
 use crate::{memory, volume};
 
@@ -46,22 +46,20 @@ impl Voxels {
         }
     }
 
-    /// Overwrites them with the voxels of a mesh, `repeat` times.
+    /// Overwrites them with the voxels of a mesh.
     pub(crate) fn fill(
         &mut self,
         engine: &Engine,
         lattice: &LatticeMesh<'_>,
-        job: &Job,
-        way: Fill,
-        repeat: u32,
+        task: Task<'_>,
         reporter: &Reporter,
     ) -> Result<Ran> {
         match self {
-            Self::Dense(volume) => engine.run(lattice, job, way, volume, repeat, reporter),
-            Self::Bricks(map) => engine::on_cpu(repeat, reporter, || {
+            Self::Dense(volume) => engine.run(lattice, task, volume, reporter),
+            Self::Bricks(map) => engine::on_cpu(task.repeat, reporter, || {
                 // The last ones first, so that there is room for the new.
-                *map = BrickMap::empty(*job.grid());
-                *map = CpuBackend::default().voxelize_bricks(lattice, job, memory::available_for_voxels())?;
+                *map = BrickMap::empty(*task.job.grid());
+                *map = CpuBackend::default().voxelize_bricks(lattice, task.job, memory::available_for_voxels())?;
                 Ok(Strategy::ColumnRuns)
             }),
         }
