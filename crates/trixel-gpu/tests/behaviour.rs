@@ -6,7 +6,8 @@ use trixel::conformance::zoo;
 use trixel::lattice::LatticeMesh;
 use trixel::{Backend, CpuBackend, Grid, Job, Mesh, Mode, Strategy, Volume};
 use trixel_gpu::{
-    AdapterChoice, Cutoff, Dilation, Gpu, GpuError, GpuMesh, GpuVolume, Heuristic, Options, Tier, Voxelizer, wgpu,
+    AdapterChoice, Cutoff, Dilation, Gpu, GpuError, GpuMesh, GpuVolume, Heuristic, Options, Tier, Voxelizer,
+    strategies_of, wgpu,
 };
 
 const DRIVERS: [&str; 2] = ["llvmpipe", "SwiftShader"];
