@@ -1,7 +1,7 @@
 //! [`super::Fill::March`]: \[CL\] figure 3 along every column, and its low-pass filter.
 
-use super::FillReport;
 use super::columns::Columns;
+use super::{FillReport, Thickness};
 use crate::volume::{Volume, WORD_BITS};
 
 pub(super) fn correct(columns: &Columns<'_>, filled: &mut Volume) -> FillReport {
@@ -10,22 +10,17 @@ pub(super) fn correct(columns: &Columns<'_>, filled: &mut Volume) -> FillReport 
     let mut report = FillReport::default();
     for column in (0..columns.count()).filter(|column| columns.is_questionable(*column)) {
         report.questionable += 1;
-        let good = columns.around(column).filter(|other| !columns.is_questionable(*other));
-        let (mut sum, mut count) = (0, 0);
+        let Some(thickness) = mean_around(columns, column) else {
+            report.uncorrected += 1;
+            continue;
+        };
         let (mut firsts, mut entered) = (0, 0);
-        for other in good {
-            sum += columns.switched(other).map(|word| u64::from(word.count_ones())).sum::<u64>();
-            count += 1;
+        for other in good_around(columns, column) {
             if let Some(first) = first_bit(columns.words(other)) {
                 firsts += u64::from(first);
                 entered += 1;
             }
         }
-        if count == 0 {
-            report.uncorrected += 1;
-            continue;
-        }
-        let thickness = mean(sum, count);
         let first = if entered > 0 { mean(firsts, entered) } else { first_bit(columns.words(column)).unwrap_or(nz) };
         let end = first.saturating_add(thickness).min(nz);
         for (at, word) in
@@ -35,6 +30,32 @@ pub(super) fn correct(columns: &Columns<'_>, filled: &mut Volume) -> FillReport 
         }
     }
     report
+}
+
+/// \[CL\] figure 3 for every column.
+pub(super) fn thicknesses(columns: &Columns<'_>) -> Vec<Thickness> {
+    let of = |column| {
+        let questionable = columns.is_questionable(column);
+        let slices = if questionable { mean_around(columns, column) } else { None };
+        Thickness { slices: slices.unwrap_or_else(|| inside(columns, column)), questionable }
+    };
+    (0..columns.count()).map(of).collect()
+}
+
+fn good_around(columns: &Columns<'_>, column: usize) -> impl Iterator<Item = usize> {
+    columns.around(column).filter(|other| !columns.is_questionable(*other))
+}
+
+/// The slices of a column that are inside.
+fn inside(columns: &Columns<'_>, column: usize) -> u32 {
+    columns.switched(column).map(u64::count_ones).sum()
+}
+
+/// The mean thickness of the good columns around one, if there are any.
+fn mean_around(columns: &Columns<'_>, column: usize) -> Option<u32> {
+    let add = |(sum, count), other| (sum + u64::from(inside(columns, other)), count + 1);
+    let (sum, count) = good_around(columns, column).fold((0, 0), add);
+    (count > 0).then(|| mean(sum, count))
 }
 
 /// The mean, rounded.

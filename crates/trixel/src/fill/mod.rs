@@ -98,5 +98,21 @@ pub fn fill(boundary: &Volume, fill: Fill) -> Result<(Volume, FillReport), Volum
     Ok((filled, report))
 }
 
+/// How much of a solid a line along z passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Thickness {
+    /// Slices inside, all together. [`crate::Frame::thickness`] tells how long each is in the world.
+    pub slices: u32,
+    /// Whether the number of boundary voxels was odd: then `slices` is the mean of the good columns among the eight around,
+    /// or what was marched if there are none.
+    pub questionable: bool,
+}
+
+/// \[CL\] figure 3: the thickness of every column of the boundary voxels of [`crate::Mode::Sliced`], y fastest, then x.
+#[must_use]
+pub fn thicknesses(boundary: &Volume) -> Vec<Thickness> {
+    march::thicknesses(&Columns::of(boundary))
+}
+
 #[cfg(test)]
 mod tests;

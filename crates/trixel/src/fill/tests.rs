@@ -1,6 +1,7 @@
 use super::*;
 use crate::grid::Grid;
 use crate::job::Job;
+use crate::mesh::Mesh;
 use crate::mode::Mode;
 
 fn volume(dims: [u32; 3], set: impl Fn([u32; 3]) -> bool) -> Volume {
@@ -103,5 +104,32 @@ fn a_sphere_is_nearly_right() {
         // Where a boundary voxel is on the wrong side of its surface, by half a voxel.
         assert!(on.len() as u64 <= boundary.count());
         assert!(off.len() < 40, "{way}: {} wrong beside the boundary, {report:?}", off.len());
+    }
+}
+
+#[test]
+fn a_balls_thickness_is_its_chord() {
+    let mesh = crate::scene::build("sphere").unwrap();
+    let grid = Grid::fit(&mesh.bounds().unwrap(), 101).unwrap();
+    let job = Job::new(grid, Mode::Sliced);
+    let found = thicknesses(&crate::voxelize(&mesh, &job).unwrap());
+    let holed: Vec<_> = mesh.triangles.iter().enumerate().filter(|(i, _)| i % 97 != 0).map(|(_, t)| *t).collect();
+    let corrected = thicknesses(&crate::voxelize(&Mesh { triangles: holed, ..mesh }, &job).unwrap());
+    assert!(corrected.iter().filter(|thickness| thickness.questionable).count() > 50);
+    for x in 0..101_u32 {
+        for y in 0..101_u32 {
+            let far = (f64::from(x) - 50.0).hypot(f64::from(y) - 50.0);
+            if far < 45.0 {
+                let chord = 2.0 * (50.5_f64.powi(2) - far.powi(2)).sqrt();
+                let place = (x * 101 + y) as usize;
+                assert!(!found[place].questionable && (f64::from(found[place].slices) - chord).abs() < 1.5);
+                let Thickness { slices, questionable } = corrected[place];
+                // A neighbour that lost both of its crossings looks empty, and counts as good.
+                assert!(
+                    !questionable || (f64::from(slices) - chord).abs() < 0.6 * chord,
+                    "{x} {y}: {slices} of {chord}"
+                );
+            }
+        }
     }
 }
