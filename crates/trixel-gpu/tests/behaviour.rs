@@ -70,7 +70,9 @@ fn one_triangle_across_the_grid() {
     // More columns than one invocation may loop over on lavapipe, which would end the loop without an error.
     let mesh = zoo::soup(&[[[0.3, 0.2, 0.1], [511.7, 3.3, 500.2], [2.5, 511.9, 255.5]]]);
     for driver in DRIVERS {
-        compare(&open(driver), "spanning triangle", &mesh, unit_grid([512; 3]), &Mode::ALL);
+        // Slice by slice takes SwiftShader long, and no driver loops there.
+        let modes = if driver == "llvmpipe" { &Mode::ALL[..] } else { &Mode::ALL[..3] };
+        compare(&open(driver), "spanning triangle", &mesh, unit_grid([512; 3]), modes);
     }
 }
 

@@ -90,6 +90,5 @@ mod swiftshader {
     trixel::conformance_suite!(batched hybrid_two_pass, hybrid(&SWIFTSHADER, Strategy::HybridTwoPass));
     trixel::conformance_suite!(batched balanced, plain(&SWIFTSHADER, Strategy::Balanced));
     trixel::conformance_suite!(sliced sliced, plain(&SWIFTSHADER, Strategy::Sliced));
-    trixel::conformance_suite!(sliced sliced_hasselgren_hull, sliced_hull(&SWIFTSHADER));
     trixel::conformance_suite!(sliced slice_per_pass, plain(&SWIFTSHADER, Strategy::SlicePerPass));
 }
