@@ -78,8 +78,7 @@ fn colors_are_those_of_the_point_on_the_ray() {
                 let what = format!("{scene}, {name}, {driver}");
                 for (strategy, overlap) in [(Strategy::Sliced, 0.0), (Strategy::SlicePerPass, 0.3)] {
                     let slicing = Slicing { strategy, overlap, fill: None };
-                    let volume =
-                        MaterialVolume::sliced(&gpu, frame.clone(), Precision::Full, &mesh, &glass(), &slicing);
+                    let volume = MaterialVolume::sliced(&gpu, frame, Precision::Full, &mesh, &glass(), &slicing);
                     let texels = volume.unwrap().download(&gpu).unwrap();
                     let expected = sliced_on_the_cpu(&frame, &mesh, overlap);
                     assert!(expected.count() > 100, "{what}");
@@ -111,8 +110,7 @@ fn every_precision_holds_the_same() {
     let [_, _, (_, frame), _] = &frames(&mesh, 30)[..] else { panic!("four frames") };
     let media = Media::uniform(Medium { absorption: 7.5, refraction_index: 1.33 });
     let made = |precision| {
-        let volume =
-            MaterialVolume::sliced(&gpu, frame.clone(), precision, &mesh, &media, &Slicing::default()).unwrap();
+        let volume = MaterialVolume::sliced(&gpu, *frame, precision, &mesh, &media, &Slicing::default()).unwrap();
         assert_eq!(volume.surface().format(), precision.format());
         volume.download(&gpu).unwrap()
     };
@@ -156,8 +154,7 @@ fn the_first_triangle_wins_in_every_run() {
             let gpu = open(driver);
             for strategy in BOTH {
                 let slicing = Slicing { strategy, ..Slicing::default() };
-                let volume =
-                    MaterialVolume::sliced(&gpu, frame.clone(), Precision::Full, &mesh, &media, &slicing).unwrap();
+                let volume = MaterialVolume::sliced(&gpu, frame, Precision::Full, &mesh, &media, &slicing).unwrap();
                 let texels = volume.download(&gpu).unwrap();
                 for [x, y] in [[0, 0], [3, 5], [7, 7]] {
                     let found = texels.get([x, y, 2]);
@@ -186,7 +183,7 @@ fn insides_are_the_fills_and_have_the_medium_of_the_surface_before() {
     let framed = frame.mesh(&mesh).unwrap().mesh;
     for fill in Fill::ALL {
         let slicing = Slicing { fill: Some(fill), ..Slicing::default() };
-        let volume = MaterialVolume::sliced(&gpu, frame.clone(), Precision::Half, &mesh, &media, &slicing).unwrap();
+        let volume = MaterialVolume::sliced(&gpu, frame, Precision::Half, &mesh, &media, &slicing).unwrap();
         let texels = volume.download(&gpu).unwrap();
         let expected = match fill {
             Fill::Parity => trixel::voxelize(&framed, &Job::new(frame.grid(), Mode::Solid)).unwrap(),
@@ -212,12 +209,12 @@ fn what_cannot_be_is_refused() {
     let gpu = open("llvmpipe");
     let mesh = colored_by_place("cube");
     let frame = Frame::of_grid(&Grid::new([0.0; 3], [0.1; 3], [10; 3]).unwrap()).unwrap();
-    let make = |slicing| MaterialVolume::sliced(&gpu, frame.clone(), Precision::Eight, &mesh, &glass(), &slicing);
+    let make = |slicing| MaterialVolume::sliced(&gpu, frame, Precision::Eight, &mesh, &glass(), &slicing);
     let hybrid = make(Slicing { strategy: Strategy::Hybrid, ..Slicing::default() });
     assert!(matches!(hybrid, Err(GpuError::NoClaims(Strategy::Hybrid))));
     assert!(matches!(make(Slicing { overlap: -1.0, ..Slicing::default() }), Err(GpuError::Cpu(_))));
     let empty = Mesh::new(vec![], vec![]);
-    let volume = MaterialVolume::sliced(&gpu, frame.clone(), Precision::Eight, &empty, &glass(), &Slicing::default());
+    let volume = MaterialVolume::sliced(&gpu, frame, Precision::Eight, &empty, &glass(), &Slicing::default());
     let texels = volume.unwrap().download(&gpu).unwrap();
     assert!(all([10; 3]).all(|voxel| texels.get(voxel) == VoxelMaterial::default()));
 }
