@@ -8,7 +8,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use trixel::attributes::{AttributeKind, Combine};
 use trixel::fill::Fill;
 use trixel::{Grid, Job, Mode, Strategy, UpAxis};
-use trixel_gpu::{Dilation, Heuristic};
+use trixel_gpu::{Dilation, Heuristic, ListMethod};
 
 use crate::render_args::{ANIMATE_EXAMPLES, AnimateArgs, RENDER_EXAMPLES, RenderArgs};
 
@@ -124,6 +124,10 @@ pub(crate) struct VoxelizeArgs {
 
     #[command(flatten)]
     pub(crate) attributes: AttributeArgs,
+
+    /// Also list the set voxels on the GPU by this method, and report its time and memory; all give the same list.
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "GPU")]
+    pub(crate) list_method: Option<ListMethodArg>,
 
     /// Write .npz as a list of set voxels (`indices`) instead of a dense array, and .ply as a cloud of their centres
     /// instead of faces.
@@ -641,6 +645,30 @@ pub(crate) enum BackendArg {
     Cpu,
     /// A GPU, through Vulkan, Metal or Direct3D 12; a software one if there is no other.
     Gpu,
+}
+
+/// [`ListMethod`] on the command line.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ListMethodArg {
+    /// Prefix sums over the finished bits.
+    Scan,
+    /// A pyramid of sums over the finished bits, which every entry descends alone.
+    Histopyramid,
+    /// While voxelizing: whoever sets a bit first appends the voxel; then sorted.
+    Atomic,
+    /// While voxelizing, without bits: every triangle appends all its voxels; sorted and merged. Not for solids.
+    FragmentList,
+}
+
+impl From<ListMethodArg> for ListMethod {
+    fn from(method: ListMethodArg) -> Self {
+        match method {
+            ListMethodArg::Scan => Self::Scan,
+            ListMethodArg::Histopyramid => Self::Histopyramid,
+            ListMethodArg::Atomic => Self::Atomic,
+            ListMethodArg::FragmentList => Self::FragmentList,
+        }
+    }
 }
 
 /// [`Strategy`] on the command line.

@@ -3,17 +3,19 @@
 use std::time::Instant;
 
 use anyhow::Result;
+use trixel::attributes::{AttributeRequest, VoxelAttributes};
 use trixel::fill::{Fill, FillReport};
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, CpuBackend, Job, Mode, Strategy, Volume};
+use trixel::{Backend, CpuBackend, Job, Mesh, Mode, Strategy, Volume, VoxelOrder};
 use trixel_gpu::{
-    AdapterChoice, Counters, Cutoff, Gpu, GpuError, GpuMesh, GpuVolume, Heuristic, Options, STRATEGIES, Voxelizer,
+    AdapterChoice, Counters, Cutoff, Gpu, GpuError, GpuMesh, GpuSurface, GpuVolume, Heuristic, ListMethod, Options,
+    STRATEGIES, Voxelizer,
 };
 
-use crate::args::{BackendArg, MethodArgs};
+use crate::args::{BackendArg, MethodArgs, VoxelizeArgs};
 use crate::grid::usage;
 use crate::progress::Reporter;
-use crate::report::{AdapterReport, CutoffReport};
+use crate::report::{AdapterReport, CutoffReport, ListReport};
 use crate::tuned;
 
 /// An open backend.
@@ -27,14 +29,17 @@ pub(crate) enum Engine {
     },
 }
 
-/// What to run.
-#[derive(Clone, Copy)]
+/// What to do with a mesh.
 pub(crate) struct Task<'a> {
+    pub(crate) mesh: &'a Mesh,
+    pub(crate) lattice: &'a LatticeMesh<'a>,
     pub(crate) job: &'a Job,
     /// How a solid's inside is found.
     pub(crate) fill: Fill,
-    /// How many times; what is measured is all of them.
     pub(crate) repeat: u32,
+    pub(crate) attributes: Option<&'a AttributeRequest>,
+    /// How a GPU is to list the voxels.
+    pub(crate) list_method: Option<ListMethod>,
 }
 
 impl Task<'_> {
@@ -58,6 +63,9 @@ pub(crate) struct Ran {
     pub(crate) download_ms: Option<f64>,
     /// What became of the columns that were filled.
     pub(crate) fill: Option<FillReport>,
+    pub(crate) list: Option<ListReport>,
+    /// Attributes, where the device found them, and how long it took.
+    pub(crate) attributes: Option<(VoxelAttributes, f64)>,
 }
 
 impl Engine {
@@ -98,6 +106,13 @@ impl Engine {
         }
         if Self::is_gpu_named(method) && strategy == Strategy::ColumnRuns {
             usage("--strategy column-runs is the processor's; leave it out, or use --backend cpu");
+        }
+    }
+
+    /// Refuses a list method where no GPU is asked for.
+    pub(crate) fn check_list_method(args: &VoxelizeArgs) {
+        if args.list_method.is_some() && !Self::is_gpu_named(&args.method) {
+            usage("--list-method is about lists on a GPU; add --backend gpu, or leave it out");
         }
     }
 
@@ -144,20 +159,14 @@ impl Engine {
         matches!(self, Self::Cpu | Self::Gpu { cpu_may_help: true, .. })
     }
 
-    /// Voxelizes, and fills where the inside is not found by parity.
-    pub(crate) fn run(
-        &self,
-        mesh: &LatticeMesh<'_>,
-        task: Task<'_>,
-        volume: &mut Volume,
-        reporter: &Reporter,
-    ) -> Result<Ran> {
+    /// Voxelizes as often as the task says.
+    pub(crate) fn run(&self, task: &Task<'_>, volume: &mut Volume, reporter: &Reporter) -> Result<Ran> {
         match self {
-            Self::Cpu => run_on_cpu(mesh, task, volume, reporter),
-            Self::Gpu { gpu, options, cpu_may_help } => match run_on_gpu(gpu, options, mesh, task, volume, reporter) {
+            Self::Cpu => run_on_cpu(task, volume, reporter),
+            Self::Gpu { gpu, options, cpu_may_help } => match run_on_gpu(gpu, options, task, volume, reporter) {
                 Err(error) if *cpu_may_help => {
                     reporter.warn(format!("{error}; the processor computes instead"));
-                    run_on_cpu(mesh, task, volume, reporter)
+                    run_on_cpu(task, volume, reporter)
                 }
                 ran => Ok(ran?),
             },
@@ -165,11 +174,13 @@ impl Engine {
     }
 }
 
-fn run_on_cpu(mesh: &LatticeMesh<'_>, task: Task<'_>, volume: &mut Volume, reporter: &Reporter) -> Result<Ran> {
+fn run_on_cpu(task: &Task<'_>, volume: &mut Volume, reporter: &Reporter) -> Result<Ran> {
     let mut report = None;
     let ran = on_cpu(task.repeat, reporter, || {
-        let Some(boundary) = task.boundary() else { return CpuBackend::default().voxelize(mesh, task.job, volume) };
-        let strategy = CpuBackend::default().voxelize(mesh, &boundary, volume)?;
+        let Some(boundary) = task.boundary() else {
+            return CpuBackend::default().voxelize(task.lattice, task.job, volume);
+        };
+        let strategy = CpuBackend::default().voxelize(task.lattice, &boundary, volume)?;
         let (filled, filling) = trixel::fill::fill(volume, task.fill)?;
         *volume = filled;
         report = Some(filling);
@@ -203,19 +214,20 @@ pub(crate) fn on_cpu(
         samples_ms,
         download_ms: None,
         fill: None,
+        list: None,
+        attributes: None,
     })
 }
 
 fn run_on_gpu(
     gpu: &Gpu,
     options: &Options,
-    mesh: &LatticeMesh<'_>,
-    task: Task<'_>,
+    task: &Task<'_>,
     volume: &mut Volume,
     reporter: &Reporter,
 ) -> Result<Ran, GpuError> {
     let boundary = task.boundary();
-    let job = boundary.as_ref().unwrap_or(task.job);
+    let (mesh, job) = (task.lattice, boundary.as_ref().unwrap_or(task.job));
     let (voxelizer, check_ms) =
         reporter.stage("checking the GPU and building its pipelines", || Voxelizer::new(gpu, job, options));
     let mut voxelizer = voxelizer?;
@@ -241,6 +253,24 @@ fn run_on_gpu(
     let passes_ms = voxelizer.pass_times()?.iter().map(|pass| (pass.name, pass.ms)).collect();
     let start = Instant::now();
     voxels.download(gpu, volume)?;
+    let download_ms = start.elapsed().as_secs_f64() * 1e3;
+    let list =
+        task.list_method.map(|method| list(&mut voxelizer, &on_gpu, method, task.repeat, reporter)).transpose()?;
+    // Of filled voxels the processor finds them: the voxelizer's own are the slices.
+    let request = task.attributes.filter(|_| boundary.is_none());
+    let attributes = request.and_then(|request| {
+        let (found, ms) = reporter.stage("finding attributes", || {
+            let surface = GpuSurface::upload(gpu, task.mesh, mesh, job.grid(), request)?;
+            voxelizer.attributes(&surface, &voxels)?.download(gpu, task.mesh)
+        });
+        match found {
+            Ok(attributes) => Some((attributes, ms)),
+            Err(error) => {
+                reporter.warn(format!("{error}; the processor finds the attributes instead"));
+                None
+            }
+        }
+    });
     let strategy = voxelizer.strategy();
     let hybrid = matches!(strategy, Strategy::Hybrid | Strategy::HybridTwoPass);
     Ok(Ran {
@@ -253,7 +283,26 @@ fn run_on_gpu(
         check_ms: Some(check_ms),
         upload_ms: Some(upload_ms),
         samples_ms,
-        download_ms: Some(start.elapsed().as_secs_f64() * 1e3),
+        download_ms: Some(download_ms),
+        list,
+        attributes,
         fill: report,
     })
+}
+
+/// Lists the voxels by a method, as often as voxelizing is repeated.
+fn list(
+    voxelizer: &mut Voxelizer,
+    mesh: &GpuMesh,
+    method: ListMethod,
+    repeat: u32,
+    reporter: &Reporter,
+) -> Result<ListReport, GpuError> {
+    let mut report = ListReport::new(method);
+    for _ in 0..repeat {
+        let (list, ms) = reporter.stage("listing", || voxelizer.list(mesh, method, VoxelOrder::Xyz));
+        report.add(&list?, ms);
+    }
+    reporter.say(&report.to_string());
+    Ok(report)
 }

@@ -3,8 +3,8 @@
 use serde::Serialize;
 use trixel::attributes::VoxelAttributes;
 use trixel::fill::{Fill, FillReport};
-use trixel::{Grid, Job, Mesh, Mode, Topology};
-use trixel_gpu::{AdapterInfo, Counters, Cutoff};
+use trixel::{Bytes, Grid, Job, Mesh, Mode, Topology};
+use trixel_gpu::{AdapterInfo, Counters, Cutoff, GpuVoxelList, ListMethod};
 
 /// What `--report` writes.
 #[derive(Debug, Serialize)]
@@ -32,6 +32,9 @@ pub(crate) struct Report {
     pub(crate) counters: Option<Counters>,
     /// The hybrids' cutoff.
     pub(crate) cutoff: Option<CutoffReport>,
+    /// The list that `--list-method` asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) list: Option<ListReport>,
     /// Milliseconds of each pass of the last run on the device, where it has timestamps.
     pub(crate) passes_ms: Vec<(&'static str, f64)>,
     pub(crate) peak_memory_bytes: Option<u64>,
@@ -152,6 +155,40 @@ pub(crate) struct CutoffReport {
 impl From<Cutoff> for CutoffReport {
     fn from(cutoff: Cutoff) -> Self {
         Self { heuristic: cutoff.heuristic.name(), value: cutoff.value }
+    }
+}
+
+/// How the voxels were listed on a GPU.
+#[derive(Debug, Serialize)]
+pub(crate) struct ListReport {
+    method: &'static str,
+    entries: u32,
+    /// Milliseconds of voxelizing and listing together: the median, and every sample.
+    ms: f64,
+    samples_ms: Vec<f64>,
+    /// Bytes of the list, and the most that making it took beside it and the voxels' bits.
+    bytes: u64,
+    scratch_bytes: u64,
+}
+
+impl ListReport {
+    pub(crate) fn new(method: ListMethod) -> Self {
+        Self { method: method.name(), entries: 0, ms: 0.0, samples_ms: vec![], bytes: 0, scratch_bytes: 0 }
+    }
+
+    /// Adds a sample.
+    pub(crate) fn add(&mut self, list: &GpuVoxelList, ms: f64) {
+        self.samples_ms.push(ms);
+        self.ms = median(&self.samples_ms);
+        (self.entries, self.bytes, self.scratch_bytes) = (list.len(), list.bytes(), list.scratch_bytes());
+    }
+}
+
+impl std::fmt::Display for ListReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { method, entries, ms, .. } = self;
+        let [list, scratch] = [self.bytes, self.scratch_bytes].map(Bytes);
+        write!(f, "{method}: {entries} voxels voxelized and listed in {ms:.1} ms, {list} and {scratch} to make it")
     }
 }
 

@@ -33,6 +33,12 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
         usage("nothing to write: give -o OUT (for example -o voxels.npz) or --report FILE.json");
     }
     check_method(&args.method);
+    if args.list_method.is_some() && Fill::from(args.method.fill) != Fill::Parity {
+        usage(
+            "--list-method lists voxels while they are voxelized, and --fill finds them later; leave one of them out",
+        );
+    }
+    Engine::check_list_method(&args);
     args.outputs.iter().try_for_each(|output| volume::check_extension(output))?;
     check_paths(&args.inputs, &args.outputs, args.report.as_deref())?;
     if let Some(report) = &args.report {
@@ -87,8 +93,17 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let mut voxels = voxels?;
     stages.allocate = allocate_ms;
 
-    let task = Task { job: &job, fill: args.method.fill.into(), repeat: args.repeat.get() };
-    let ran = voxels.fill(&engine, &lattice, task, &reporter)?;
+    let fill = Fill::from(args.method.fill);
+    let task = Task {
+        mesh: &loaded,
+        lattice: &lattice,
+        job: &job,
+        fill,
+        repeat: args.repeat.get(),
+        attributes: wanted.as_ref(),
+        list_method: args.list_method.map(Into::into),
+    };
+    let mut ran = voxels.fill(&engine, &task, &reporter)?;
     stages.open = ran.check_ms.map(|check_ms| open_ms + check_ms);
     stages.upload = ran.upload_ms;
     stages.download = ran.download_ms;
@@ -101,8 +116,12 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
         stages.rank = Some(ms);
         rank
     });
-    let described = match (&wanted, dense) {
-        (Some(wanted), Some(dense)) => {
+    let described = match (&wanted, dense, ran.attributes.take()) {
+        (Some(_), _, Some((found, ms))) => {
+            stages.attributes = Some(ms);
+            Some(found)
+        }
+        (Some(wanted), Some(dense), None) => {
             let (described, ms) =
                 reporter.stage("finding attributes", || compute(&loaded, &lattice, &job, dense, wanted));
             stages.attributes = Some(ms);
@@ -120,7 +139,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
         reporter.say(&format!(
             "filled between slices ({}): {questionable} columns were questionable, {uncorrected} of them past correction; \
              `trixel verify --mode solid` lists what differs from the exact solid",
-            task.fill
+            fill
         ));
     }
     let count = voxels.count();
@@ -160,7 +179,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
             grid: GridReport::from(job.grid()),
             mode: job.mode().name(),
             overlap: args.method.overlap,
-            fill: FillRecord::new(&job, task.fill, ran.fill),
+            fill: FillRecord::new(&job, fill, ran.fill),
             backend: ran.backend,
             strategy: ran.strategy.name(),
             threads: rayon::current_num_threads(),
@@ -171,6 +190,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
             samples_ms: samples,
             counters: ran.counters,
             cutoff: ran.cutoff,
+            list: ran.list,
             passes_ms: ran.passes_ms,
             peak_memory_bytes: memory::peak(),
             outputs: args.outputs.iter().map(|path| path.display().to_string()).collect(),

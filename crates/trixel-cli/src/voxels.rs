@@ -4,7 +4,6 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use trixel::fill::Fill;
-use trixel::lattice::LatticeMesh;
 use trixel::{BrickMap, Bytes, CpuBackend, Job, Occupancy, Strategy, Volume};
 use trixel_io::VolumeFormat;
 use trixel_io::atomic_file::Staged;
@@ -46,20 +45,15 @@ impl Voxels {
         }
     }
 
-    /// Overwrites them with the voxels of a mesh.
-    pub(crate) fn fill(
-        &mut self,
-        engine: &Engine,
-        lattice: &LatticeMesh<'_>,
-        task: Task<'_>,
-        reporter: &Reporter,
-    ) -> Result<Ran> {
+    /// Overwrites them with the voxels of a mesh, as often as the task says.
+    pub(crate) fn fill(&mut self, engine: &Engine, task: &Task<'_>, reporter: &Reporter) -> Result<Ran> {
         match self {
-            Self::Dense(volume) => engine.run(lattice, task, volume, reporter),
+            Self::Dense(volume) => engine.run(task, volume, reporter),
             Self::Bricks(map) => engine::on_cpu(task.repeat, reporter, || {
+                let Task { lattice, job, .. } = task;
                 // The last ones first, so that there is room for the new.
-                *map = BrickMap::empty(*task.job.grid());
-                *map = CpuBackend::default().voxelize_bricks(lattice, task.job, memory::available_for_voxels())?;
+                *map = BrickMap::empty(*job.grid());
+                *map = CpuBackend::default().voxelize_bricks(lattice, job, memory::available_for_voxels())?;
                 Ok(Strategy::ColumnRuns)
             }),
         }

@@ -349,12 +349,41 @@ fn a_gpu_gives_the_same_bytes_and_reports_itself() {
 }
 
 #[test]
+fn a_gpu_finds_the_same_attributes_and_lists_by_every_method() {
+    let bench = Bench::new();
+    square(&bench);
+    let arguments = "--resolution 40 --attributes color,normal,triangle,barycentric --sparse";
+    bench.ok(&format!("voxelize square.obj {arguments} --backend cpu -o cpu.npz"));
+    for method in ["scan", "histopyramid", "atomic", "fragment-list"] {
+        let gpu = format!("--adapter llvmpipe --list-method {method} --report r.json");
+        let said = bench.ok(&format!("voxelize square.obj {arguments} {gpu} -o gpu.npz")).stderr;
+        assert!(said.contains(&format!("{method}: ")) && !said.contains("instead"), "{said}");
+        assert_eq!(std::fs::read(bench.path("cpu.npz")).unwrap(), std::fs::read(bench.path("gpu.npz")).unwrap());
+        let report = bench.json("r.json");
+        assert_eq!((&report["list"]["method"], &report["list"]["entries"]), (&method.into(), &report["voxels"]));
+        assert!(report["list"]["ms"].as_f64() > Some(0.0) && report["list"]["scratch_bytes"].is_u64());
+        assert!(report["stages_ms"]["attributes"].is_number());
+    }
+    // Longer than the shaders take: the processor does it, and says so.
+    bench.write("long.obj", "v -9000 0 1.5\nv 9000 0 1.5\nv 0 9000 1.5\nf 1 2 3\n");
+    let grid = "--dims 4 4 4 --origin 0 0 0 --voxel-size 1 --attributes triangle";
+    let said = bench.ok(&format!("voxelize long.obj {grid} --adapter llvmpipe -o long.npz")).stderr;
+    assert!(said.contains("the processor finds the attributes instead"), "{said}");
+}
+
+#[test]
 fn contradicting_gpu_arguments_are_refused() {
     let bench = Bench::new();
     for (status, arguments, words) in [
         (2, "voxelize scene:torus -o t.npz --backend cpu --strategy hybrid", ["hybrid", "--backend gpu"]),
         (2, "voxelize scene:torus -o t.npz --backend cpu --adapter x", ["--adapter", "--backend cpu"]),
         (2, "voxelize scene:torus -o t.npz --backend gpu --strategy column-runs", ["column-runs", "--backend cpu"]),
+        (2, "voxelize scene:torus -o t.npz --list-method scan", ["--list-method", "--backend gpu"]),
+        (
+            1,
+            "voxelize scene:torus -o t.npz -m solid --adapter llvmpipe --list-method fragment-list",
+            ["solid", "atomic"],
+        ),
         (2, "voxelize scene:torus -o t.npz --backend gpu --cutoff -1", ["cutoff", "0 or more"]),
         (1, "voxelize scene:torus -o t.npz --adapter no-such-gpu", ["no-such-gpu", "there are"]),
     ] {

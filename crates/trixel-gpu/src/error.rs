@@ -139,6 +139,14 @@ pub enum GpuError {
         /// The device's longest.
         limit: u32,
     },
+    /// An image of a texture that is too long for the shaders.
+    #[error("an image is {side} texels long, and attributes on the GPU take {limit} at most; scale it, or use the CPU")]
+    ImageTooLarge {
+        /// The image's longer side.
+        side: u32,
+        /// The longest that the shaders take.
+        limit: u32,
+    },
     /// The volume has another grid than the job.
     #[error("the volume's grid is not the job's")]
     GridMismatch,

@@ -7,9 +7,11 @@ use std::sync::{Mutex, PoisonError};
 
 use trixel::VoxelOrder;
 
+use crate::attributes::Recipe;
 use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::limits::WORKGROUP;
+use crate::lists::SortKey;
 use crate::material_volume::Precision;
 use crate::shader::shader;
 
@@ -23,8 +25,8 @@ pub(crate) enum Kernel {
     SumWords,
     SumCells,
     Traverse,
-    CountDigits(VoxelOrder),
-    MoveEntries(VoxelOrder),
+    CountDigits(SortKey),
+    MoveEntries(SortKey),
     CountDistinct,
     WriteDistinct,
     MarkCubes,
@@ -35,6 +37,17 @@ pub(crate) enum Kernel {
     WriteNodes,
     WriteBricks,
     Answer,
+    MarchOctree,
+    MarchBricks,
+    CountBeforePlanes,
+    LocateFragments,
+    Prioritize(Recipe),
+    Weigh(Recipe),
+    ChooseWinners(Recipe),
+    WriteVoxelRows(Recipe),
+    GatherPairs(Recipe),
+    WriteFragmentRows(Recipe),
+    CopyCounts(Recipe),
     /// Whether columns with an odd number of boundary voxels are filled as well.
     SwitchColumns {
         uncorrected: bool,
@@ -52,8 +65,18 @@ impl Kernel {
     /// Every kernel.
     #[cfg(test)]
     pub(crate) fn all() -> Vec<Self> {
-        let orders = [VoxelOrder::Xyz, VoxelOrder::Morton];
-        let sorting = orders.into_iter().flat_map(|order| [Self::CountDigits(order), Self::MoveEntries(order)]);
+        let sorting = SortKey::ALL.into_iter().flat_map(|key| [Self::CountDigits(key), Self::MoveEntries(key)]);
+        let attributes = Recipe::samples().into_iter().flat_map(|recipe| {
+            [
+                Self::Prioritize(recipe),
+                Self::Weigh(recipe),
+                Self::ChooseWinners(recipe),
+                Self::WriteVoxelRows(recipe),
+                Self::GatherPairs(recipe),
+                Self::WriteFragmentRows(recipe),
+                Self::CopyCounts(recipe),
+            ]
+        });
         let others = [
             Self::ScanBlocks,
             Self::AddTotals,
@@ -70,6 +93,10 @@ impl Kernel {
             Self::WriteNodes,
             Self::WriteBricks,
             Self::Answer,
+            Self::MarchOctree,
+            Self::MarchBricks,
+            Self::CountBeforePlanes,
+            Self::LocateFragments,
             Self::SwitchColumns { uncorrected: false },
             Self::SwitchColumns { uncorrected: true },
             Self::CorrectXor,
@@ -78,7 +105,7 @@ impl Kernel {
         let resolving = Precision::ALL
             .into_iter()
             .flat_map(|precision| [false, true].map(|filled| Self::ResolveClaims { precision, filled }));
-        others.into_iter().chain(sorting).chain(resolving).collect()
+        others.into_iter().chain(sorting).chain(attributes).chain(resolving).collect()
     }
 
     pub(crate) fn entry_point(self) -> &'static str {
@@ -99,6 +126,16 @@ impl Kernel {
             Self::WriteNodes => "write_nodes",
             Self::WriteBricks => "write_bricks",
             Self::Answer => "answer",
+            Self::MarchOctree | Self::MarchBricks => "march_rays",
+            Self::CountBeforePlanes => "count_before_planes",
+            Self::LocateFragments => "locate_fragments",
+            Self::Prioritize(_) => "prioritize",
+            Self::Weigh(_) => "weigh",
+            Self::ChooseWinners(_) => "choose_winners",
+            Self::WriteVoxelRows(_) => "write_voxel_rows",
+            Self::GatherPairs(_) => "gather_pairs",
+            Self::WriteFragmentRows(_) => "write_fragment_rows",
+            Self::CopyCounts(_) => "copy_counts",
             Self::SwitchColumns { .. } => "switch_columns",
             Self::CorrectXor => "correct_xor",
             Self::CorrectMarch => "correct_march",
@@ -123,6 +160,27 @@ impl Kernel {
             Self::WriteNodes => shader!("numbering" "octree_nodes"),
             Self::WriteBricks => shader!("numbering" "entry" "sparse" "bricks"),
             Self::Answer => shader!("numbering" "entry" "octree_query"),
+            Self::MarchOctree => {
+                shader!("product_portable" "wide" "division" "numbering" "entry" "march" "octree_cell")
+            }
+            Self::MarchBricks => {
+                shader!("product_portable" "wide" "division" "numbering" "entry" "sort_key" "march" "brick_cell")
+            }
+            Self::CountBeforePlanes | Self::LocateFragments => shader!("numbering" "entry" "locate"),
+            Self::Prioritize(_) | Self::Weigh(_) => shader!(
+                "product_portable" "wide" "division" "numbering" "entry" "light" "surface" "nearest" "overlap" "combine"
+                "weigh"
+            ),
+            Self::ChooseWinners(_) => shader!("numbering" "win"),
+            Self::WriteVoxelRows(_) => shader!(
+                "product_portable" "wide" "division" "numbering" "entry" "light" "surface" "nearest" "combine" "put_row"
+                "voxel_rows"
+            ),
+            Self::GatherPairs(_) | Self::CopyCounts(_) => shader!("numbering" "gather"),
+            Self::WriteFragmentRows(_) => shader!(
+                "product_portable" "wide" "division" "numbering" "entry" "light" "surface" "nearest" "combine" "put_row"
+                "fragment_rows"
+            ),
             Self::SwitchColumns { .. } | Self::CorrectXor | Self::CorrectMarch => shader!("numbering" "fill_slices"),
             Self::ResolveClaims { .. } => shader!("numbering" "resolve_claims"),
         }
@@ -131,15 +189,21 @@ impl Kernel {
     /// The WGSL.
     pub(crate) fn source(self) -> String {
         let constants = match self {
-            Self::CountDigits(order) | Self::MoveEntries(order) => {
-                format!("const ORDER: u32 = {}u;\n", u32::from(order == VoxelOrder::Morton))
-            }
             Self::SwitchColumns { uncorrected } => format!("const UNCORRECTED: bool = {uncorrected};\n"),
             Self::CorrectXor | Self::CorrectMarch => "const UNCORRECTED: bool = false;\n".to_owned(),
             Self::ResolveClaims { precision, filled } => format!(
                 "alias Texels = texture_storage_3d<{}, write>;\nconst FILLED: bool = {filled};\n",
                 precision.wgsl_format()
             ),
+            Self::CountDigits(key) | Self::MoveEntries(key) => format!("const ORDER: u32 = {}u;\n", key.code()),
+            Self::MarchBricks => format!("const ORDER: u32 = {}u;\n", SortKey::Voxels(VoxelOrder::Morton).code()),
+            Self::Prioritize(recipe)
+            | Self::Weigh(recipe)
+            | Self::ChooseWinners(recipe)
+            | Self::WriteVoxelRows(recipe)
+            | Self::GatherPairs(recipe)
+            | Self::WriteFragmentRows(recipe)
+            | Self::CopyCounts(recipe) => recipe.constants(),
             _ => String::new(),
         };
         [&[constants.as_str()], self.files()].concat().join("\n")

@@ -8,6 +8,7 @@
 //! three, as a [`trixel::Backend`].
 
 mod adapter;
+mod attributes;
 mod backend;
 mod counters;
 mod cutoff;
@@ -37,6 +38,7 @@ mod voxelizer;
 pub use wgpu;
 
 pub use adapter::{AdapterChoice, AdapterInfo, adapters, hardware_is_possible};
+pub use attributes::{GpuAttributes, GpuSurface};
 pub use backend::GpuBackend;
 pub use counters::Counters;
 pub use cutoff::{Cutoff, Dilation, Heuristic};
@@ -46,7 +48,7 @@ pub use limits::MAX_EXTENT;
 pub use lists::{GpuVoxelList, ListMethod, UnknownListMethod};
 pub use material_volume::{Decoding, MaterialTexels, MaterialVolume, Media, Medium, Precision, Slicing, VoxelMaterial};
 pub use mesh::GpuMesh;
-pub use sparse::{GpuBrickMap, GpuOctree};
+pub use sparse::{GpuBrickMap, GpuOctree, GridRay};
 pub use tier::Tier;
 pub use timer::PassTime;
 pub use tune::{Sample, Tuning, measure, tune};

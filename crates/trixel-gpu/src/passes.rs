@@ -11,7 +11,7 @@ use crate::limits::{SCAN_BLOCK, WORKGROUP};
 use crate::mesh::GpuMesh;
 use crate::pipelines::bind;
 use crate::scratch::{List, Lists, ScanBuffers, Scratch, Status};
-use crate::shader::{Drawn, Raster, Sink, Stage, Variant};
+use crate::shader::{Drawn, Raster, Stage, Variant};
 use crate::timer::Timer;
 use crate::volume::{GpuVolume, Slab};
 use crate::voxelizer::Classification;
@@ -121,7 +121,7 @@ impl<'a> Recorder<'a> {
 
     /// Clears a slab, or fills it with the next of `words`.
     fn initialize(&mut self, slab: &Slab, words: &mut Option<&[u8]>) -> Result<(), GpuError> {
-        if self.setting.variant.sink == Sink::Fragments {
+        if !self.setting.variant.sink.has_bits() {
             // The bits are not looked at.
             return Ok(());
         }

@@ -157,6 +157,10 @@ pub(crate) enum Sink {
     Fragments,
     /// To the bits, and to a buffer that knows the lowest triangle of each voxel; strategies of slices alone do that.
     Claims,
+    /// To a list alone, with the triangle.
+    Pairs,
+    /// Likewise the voxels whose doubled cubes a triangle meets, whatever the mode.
+    Shell,
 }
 
 impl Sink {
@@ -165,6 +169,21 @@ impl Sink {
             Self::Bits | Self::Claims => 0,
             Self::List => 1,
             Self::Fragments => 2,
+            Self::Pairs | Self::Shell => 3,
+        }
+    }
+
+    /// Whether the bits are looked at.
+    pub(crate) fn has_bits(self) -> bool {
+        matches!(self, Self::Bits | Self::List | Self::Claims)
+    }
+
+    /// Words of an entry of the list.
+    pub(crate) fn entry_words(self) -> usize {
+        match self {
+            Self::Bits | Self::Claims => 0,
+            Self::List | Self::Fragments => 2,
+            Self::Pairs | Self::Shell => 3,
         }
     }
 
@@ -172,6 +191,7 @@ impl Sink {
         match self {
             Self::Bits | Self::Claims => shader!("entry" "no_append"),
             Self::List | Self::Fragments => shader!("entry" "append"),
+            Self::Pairs | Self::Shell => shader!("entry" "append_pairs"),
         }
     }
 
@@ -220,7 +240,11 @@ pub(crate) fn raster_source(raster: Raster, variant: Variant, tier: Tier) -> Str
 
 /// `writes` says whether voxels are written.
 fn assemble(variant: Variant, tier: Tier, constants: &str, files: &[&str], writes: bool) -> String {
+    let shell = variant.sink == Sink::Shell;
+    // Its thresholds reach twice as far.
+    let max_extent = if shell { MAX_EXTENT / 2 } else { MAX_EXTENT };
     let mode = match variant.mode {
+        _ if shell => 4,
         Mode::Conservative => 0,
         Mode::Thin => 1,
         Mode::Solid => 2,
@@ -228,7 +252,7 @@ fn assemble(variant: Variant, tier: Tier, constants: &str, files: &[&str], write
     };
     let counting = variant.counting;
     let shared = format!(
-        "const MODE: u32 = {mode}u;\nconst COUNTING: bool = {counting};\nconst MAX_EXTENT: u32 = {MAX_EXTENT}u;\n"
+        "const MODE: u32 = {mode}u;\nconst COUNTING: bool = {counting};\nconst MAX_EXTENT: u32 = {max_extent}u;\n"
     );
     let product = match tier {
         Tier::Portable => include_str!("shaders/product_portable.wgsl"),
@@ -246,14 +270,14 @@ mod tests {
     use super::*;
     use crate::kernel::Kernel;
 
-    const SINKS: [Sink; 4] = [Sink::Bits, Sink::List, Sink::Fragments, Sink::Claims];
+    const SINKS: [Sink; 6] = [Sink::Bits, Sink::List, Sink::Fragments, Sink::Pairs, Sink::Shell, Sink::Claims];
 
     /// Every mode with every sink, half of them counting.
-    const VARIANTS: [Variant; 16] = {
-        let mut variants = [Variant::ANY; 16];
+    const VARIANTS: [Variant; 24] = {
+        let mut variants = [Variant::ANY; 24];
         let mut i = 0;
         while i < variants.len() {
-            variants[i] = Variant { mode: Mode::ALL[i / 4], counting: (i / 4 + i) % 2 == 1, sink: SINKS[i % 4] };
+            variants[i] = Variant { mode: Mode::ALL[i / 6], counting: (i / 6 + i) % 2 == 1, sink: SINKS[i % 6] };
             i += 1;
         }
         variants

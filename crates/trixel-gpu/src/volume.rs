@@ -1,5 +1,7 @@
 //! Voxels on the GPU.
 
+use std::ops::Range;
+
 use trixel::{Grid, Volume, WORD_BITS};
 
 use crate::error::GpuError;
@@ -114,9 +116,14 @@ impl GpuVolume {
 
     /// One slab without room for its voxels, for what writes none.
     pub(crate) fn without_voxels(gpu: &Gpu, grid: Grid) -> Result<Self, GpuError> {
-        let nx = grid.dims()[0];
+        Self::window(gpu, grid, 0..grid.dims()[0])
+    }
+
+    /// Likewise, of a part of the grid alone.
+    pub(crate) fn window(gpu: &Gpu, grid: Grid, x: Range<u32>) -> Result<Self, GpuError> {
         let buffer = gpu.buffer("trixel no voxels", 4, wgpu::BufferUsages::STORAGE)?;
-        Ok(Self { grid, column_words: Self::column_words_of(&grid), slabs: vec![Slab { buffer, x: 0, nx }] })
+        let slab = Slab { buffer, x: x.start, nx: x.end - x.start };
+        Ok(Self { grid, column_words: Self::column_words_of(&grid), slabs: vec![slab] })
     }
 
     /// The grid.

@@ -3,6 +3,7 @@
 use trixel::lattice::LatticeMesh;
 use trixel::{Backend, CpuBackend, Job, Mode, Strategy, Volume, VoxelOrder, WORD_BITS};
 
+use crate::attributes::{self, GpuAttributes, GpuSurface};
 use crate::counters::{self, Counters};
 use crate::cutoff::{Cutoff, Dilation};
 use crate::error::GpuError;
@@ -291,6 +292,36 @@ impl Voxelizer {
                 GpuVoxelList::of(&self.gpu, &volume, method, order)
             }
         }
+    }
+
+    /// The attributes of the voxels of `volume`, which this voxelizer's job made of the mesh of `surface`, equal to what
+    /// [`trixel::attributes::compute`] finds.
+    ///
+    /// ```no_run
+    /// use trixel::attributes::{AttributeKind, AttributeRequest, Combine};
+    /// use trixel::lattice::LatticeMesh;
+    /// use trixel::{Grid, Job, Mode};
+    /// use trixel_gpu::{AdapterChoice, Gpu, GpuMesh, GpuSurface, GpuVolume, Options, Voxelizer};
+    ///
+    /// let mesh = trixel::scene::build("torus")?;
+    /// let grid = Grid::fit(&mesh.bounds().expect("a torus has triangles"), 256)?;
+    /// let job = Job::new(grid, Mode::Conservative);
+    /// let gpu = Gpu::open(&AdapterChoice::Any)?;
+    /// let lattice = LatticeMesh::snap(&mesh, &grid)?;
+    /// let voxels = GpuVolume::new(&gpu, grid)?;
+    /// let mut voxelizer = Voxelizer::new(&gpu, &job, &Options::default())?;
+    /// voxelizer.run(&GpuMesh::upload(&gpu, &lattice)?, &voxels)?;
+    /// let request = AttributeRequest::new(&[AttributeKind::Normal], Combine::Mean);
+    /// let surface = GpuSurface::upload(&gpu, &mesh, &lattice, &grid, &request)?;
+    /// let attributes = voxelizer.attributes(&surface, &voxels)?.download(&gpu, &mesh)?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When the grids differ, a triangle is too large for the shaders (8192 voxels along an axis, for a solid 4096), the rows
+    /// exceed what the adapter binds, memory runs out or the device is lost.
+    pub fn attributes(&self, surface: &GpuSurface, volume: &GpuVolume) -> Result<GpuAttributes, GpuError> {
+        attributes::compute(self, surface, volume)
     }
 
     /// The device.

@@ -8,8 +8,8 @@ use trixel::lattice::LatticeMesh;
 use trixel::octree::Octree;
 use trixel::{CpuBackend, Grid, Job, Mode, Occupancy, Volume, VoxelOrder};
 use trixel_gpu::{
-    AdapterChoice, Gpu, GpuBrickMap, GpuError, GpuMesh, GpuOctree, GpuVolume, GpuVoxelList, ListMethod, Options,
-    Voxelizer,
+    AdapterChoice, Gpu, GpuBrickMap, GpuError, GpuMesh, GpuOctree, GpuVolume, GpuVoxelList, GridRay, ListMethod,
+    Options, Voxelizer,
 };
 
 const DRIVERS: [&str; 2] = ["llvmpipe", "SwiftShader"];
@@ -42,6 +42,73 @@ fn compare(gpu: &Gpu, what: &str, volume: &Volume) {
     let bricks = GpuBrickMap::of(gpu, &list).unwrap().download(gpu).unwrap();
     assert_eq!(bricks.count(), volume.count(), "{what}: bricks");
     assert!(bricks.to_volume(None).unwrap() == *volume, "{what}: bricks");
+}
+
+/// Rays from everywhere, many of them through edges and corners.
+fn rays(random: &mut Random, dims: [u32; 3], count: usize) -> Vec<GridRay> {
+    let ray = |i: usize| {
+        let steps = if i.is_multiple_of(3) { 128 } else { 1 };
+        let origin = dims.map(|d| {
+            let d = i64::from(d);
+            i32::try_from(random.range(-d, 2 * d) * 256 + random.range(0, 255) / steps * steps).unwrap()
+        });
+        let most = [1, 3, 700, 32_768][i % 4];
+        let direction = [0; 3].map(|_| i32::try_from(random.range(-most, most)).unwrap());
+        GridRay::new(origin, direction)
+    };
+    (0..count).map(ray).collect::<Vec<_>>().into_iter().flatten().collect()
+}
+
+fn compare_rays(gpu: &Gpu, what: &str, volume: &Volume, rays: &[GridRay]) {
+    let list = GpuVoxelList::of(gpu, &uploaded(gpu, volume), ListMethod::Scan, VoxelOrder::Morton).unwrap();
+    let tree = Octree::new(volume, None).unwrap();
+    let by_octree = GpuOctree::of(gpu, &list).unwrap().march(gpu, rays).unwrap();
+    let by_bricks = GpuBrickMap::of(gpu, &list).unwrap().march(gpu, rays).unwrap();
+    assert_eq!([by_octree.len(), by_bricks.len()], [rays.len(); 2]);
+    for ((ray, octree), bricks) in rays.iter().zip(by_octree).zip(by_bricks) {
+        let (origin, direction) = ray.floats();
+        let expected = tree.march(origin, direction);
+        assert_eq!(octree, expected, "{what}: octree {ray:?}");
+        assert_eq!(bricks, expected, "{what}: bricks {ray:?}");
+    }
+}
+
+#[test]
+fn rays_hit_what_they_hit_on_the_cpu() {
+    let mut random = Random::new(43);
+    for driver in DRIVERS {
+        let gpu = open(driver);
+        for (dims, filled) in [([40, 33, 70], 300), ([64, 64, 64], 4000), ([3, 2, 5], 6), ([8; 3], 0)] {
+            let mut volume = Volume::new(Grid::new([0.0; 3], [1.0; 3], dims).unwrap()).unwrap();
+            for _ in 0..filled {
+                volume.set(dims.map(|d| u32::try_from(random.range(0, i64::from(d) - 1)).unwrap()));
+            }
+            // A full cube, so that the octree has full octants.
+            let side = |d: u32| if filled > 100 { 16..d.min(32) } else { 0..0 };
+            for x in side(dims[0]) {
+                for y in side(dims[1]) {
+                    side(dims[2]).for_each(|z| volume.set([x, y, z]));
+                }
+            }
+            compare_rays(&gpu, driver, &volume, &rays(&mut random, dims, 3000));
+        }
+        let full = Volume::new(Grid::new([0.0; 3], [1.0; 3], [16; 3]).unwrap()).map(|mut volume| {
+            volume.words_mut().fill(0xffff);
+            volume
+        });
+        compare_rays(&gpu, "full", &full.unwrap(), &rays(&mut random, [16; 3], 500));
+    }
+    // A floor of posts, and a ray that passes thousands of small cubes close above it.
+    let mut volume = Volume::new(Grid::new([0.0; 3], [1.0; 3], [4096, 2, 2]).unwrap()).unwrap();
+    (0..4096).for_each(|x| volume.set([x, 0, x % 2]));
+    volume.set([4095, 1, 1]);
+    let along = GridRay::new([-700, 300, 400], [1, 0, 0]).unwrap();
+    compare_rays(&open("llvmpipe"), "posts", &volume, &[along]);
+    assert_eq!(
+        GridRay::rounded([0.5, 1.0, 2.0], [0.0, -3.0, 1.5]),
+        GridRay::new([128, 256, 512], [0, -32_768, 16_384])
+    );
+    assert!(GridRay::rounded([0.0; 3], [0.0; 3]).is_none() && GridRay::rounded([1e9; 3], [1.0; 3]).is_none());
 }
 
 #[test]

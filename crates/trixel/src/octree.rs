@@ -356,7 +356,11 @@ impl Octree {
         }
     }
 
-    /// The first set voxel on a ray, with origin and direction in voxels from the grid's minimum corner; `None` when there
+    /// The first set voxel on a ray, which must go on inside it: a ray along a face has the voxel above the face, and edges and
+    /// corners that it only touches are passed by. With origins in 1/256 voxel and directions of integers up to 2^15 no
+    /// rounding can decide.
+    ///
+    /// Origin and direction in voxels from the grid's minimum corner; `None` when there
     /// is none, or the direction is 0 or not finite.
     #[must_use]
     pub fn march(&self, origin: [f64; 3], direction: [f64; 3]) -> Option<Hit> {
@@ -372,20 +376,12 @@ impl Octree {
         if content == Content::Nothing {
             return None;
         }
-        if content == Content::Everything {
-            let voxel = std::array::from_fn(|i| {
-                let (low, width) = (f64::from(cube[i] << at), f64::from(1u32 << at));
-                let entry = ray.origin[i] + span.from * ray.direction[i];
-                // Where it enters through the upper face, the voxel is the last one below it.
-                let inside = entry.clamp(low, low + width);
-                let inside = if inside == low + width { inside - 1.0 } else { inside.floor() };
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the cube")]
-                let inside = inside as u32;
-                inside
-            });
-            return Some(Hit { distance: span.from, voxel, axis: span.axis });
+        if content == Content::Everything && at == 0 {
+            return Some(Hit { distance: span.from, voxel: cube, axis: span.axis });
         }
-        let node = self.nodes.get(index)?;
+        // Down to the voxel in full cubes as well, so that the same divisions decide everywhere.
+        let everything = Node { some: u8::MAX, full: u8::MAX, first: 0 };
+        let node = if content == Content::Everything { &everything } else { self.nodes.get(index)? };
         let mut entered: [(f64, u8, Option<Span>); 8] = std::array::from_fn(|_| (f64::INFINITY, 0, None));
         for octant in (0..8u8).filter(|octant| node.some >> octant & 1 == 1) {
             let span = ray.through(child_of(cube, octant), at - 1);

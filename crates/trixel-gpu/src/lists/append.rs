@@ -15,12 +15,12 @@ use crate::voxelizer::Voxelizer;
 /// Words before the entries: `Appended` of `append.wgsl`.
 const HEADER_WORDS: usize = 4;
 
-/// A buffer to append to, begun with some entries.
-fn begun(gpu: &Gpu, capacity: u64, before: &[[u32; 2]]) -> Result<wgpu::Buffer, GpuError> {
+/// A buffer to append to entries of so many words, begun with some.
+fn begun(gpu: &Gpu, words: usize, capacity: u64, before: &[[u32; 2]]) -> Result<wgpu::Buffer, GpuError> {
     let number = |value: u64| u32::try_from(value).unwrap_or(u32::MAX);
     let count = before.len() as u64;
     let capacity = capacity.max(count);
-    let bytes = (HEADER_WORDS as u64 + 2 * capacity) * 4;
+    let bytes = (HEADER_WORDS as u64 + words as u64 * capacity) * 4;
     let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
     let buffer = gpu.storage("the voxels appended to a list", bytes, usage)?;
     let start = [&[number(count), number(capacity), 0, 0], before.as_flattened()].concat();
@@ -29,25 +29,21 @@ fn begun(gpu: &Gpu, capacity: u64, before: &[[u32; 2]]) -> Result<wgpu::Buffer, 
 }
 
 /// Voxelizes into a list, again with more room where it was too short. Gives the buffer and how many entries it has.
-fn appended(
+/// `capacity` is a guess; only entries of two words can be there `before`.
+pub(crate) fn appended(
     voxelizer: &mut Voxelizer,
     mesh: &GpuMesh,
     volume: &GpuVolume,
     sink: Sink,
     before: &[[u32; 2]],
+    capacity: u64,
 ) -> Result<(wgpu::Buffer, u32), GpuError> {
     let gpu = voxelizer.gpu().clone();
-    let limit = (gpu.limits().binding_bytes / 4).saturating_sub(HEADER_WORDS as u64) / 2;
-    // About the surface of the grid, or a few voxels a triangle; a wrong guess costs a second run.
-    let [x, y, z] = volume.grid().dims().map(u64::from);
-    let surface = 2 * (x * y + y * z + z * x);
-    let mut capacity = match sink {
-        Sink::Fragments => 2 * surface + 4 * mesh.triangles(),
-        _ => surface,
-    }
-    .min(limit);
+    let words = sink.entry_words();
+    let limit = (gpu.limits().binding_bytes / 4).saturating_sub(HEADER_WORDS as u64) / words.max(1) as u64;
+    let mut capacity = capacity.min(limit);
     loop {
-        let buffer = begun(&gpu, capacity, before)?;
+        let buffer = begun(&gpu, words, capacity, before)?;
         voxelizer.run_appending(mesh, volume, (sink, &buffer))?;
         let header = Dispatcher::new(&gpu).read_words(&[(&buffer, HEADER_WORDS)])?.into_iter().flatten();
         let header: Vec<u32> = header.collect();
@@ -60,7 +56,7 @@ fn appended(
             return Err(GpuError::BindingTooSmall {
                 adapter: gpu.info().to_string(),
                 what: "the voxels appended to a list",
-                needed: needed * ENTRY_BYTES,
+                needed: needed * words as u64 * 4,
                 limit: gpu.limits().binding_bytes,
             });
         }
@@ -91,7 +87,11 @@ pub(crate) fn append(
     let by_cpu = if mode == Mode::Solid { None } else { voxelizer.cpu_part(mesh)? };
     let before: Vec<[u32; 2]> =
         by_cpu.iter().flat_map(|volume| voxel_list(volume, VoxelOrder::Xyz)).map(words).collect();
-    let (buffer, count) = appended(voxelizer, mesh, &volume, sink, &before)?;
+    // About the surface of the grid, or a few voxels a triangle; a wrong guess costs a second run.
+    let [x, y, z] = grid.dims().map(u64::from);
+    let surface = 2 * (x * y + y * z + z * x);
+    let guess = if merges { 2 * surface + 4 * mesh.triangles() } else { surface };
+    let (buffer, count) = appended(voxelizer, mesh, &volume, sink, &before, guess)?;
     let mut memory = Memory::default();
     let entries = Entries::new(&gpu, count)?;
     let mut dispatcher = Dispatcher::new(&gpu);

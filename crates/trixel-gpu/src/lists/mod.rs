@@ -12,7 +12,9 @@ use crate::gpu::Gpu;
 use crate::kernel::{Bound, Dispatcher};
 use crate::volume::{GpuVolume, Slab};
 
-pub(crate) use append::append;
+pub(crate) use append::{append, appended};
+pub(crate) use scan::count;
+pub(crate) use sort::{SortKey, sort_pairs};
 use sort::{distinct, sort};
 
 /// How a list of the set voxels is made. All methods give the same list.
@@ -121,6 +123,10 @@ impl Memory {
     /// So many bytes are in use together.
     pub(crate) fn reach(&mut self, bytes: u64) {
         self.0 = self.0.max(bytes);
+    }
+
+    pub(crate) fn most(&self) -> u64 {
+        self.0
     }
 }
 

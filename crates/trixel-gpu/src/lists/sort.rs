@@ -20,6 +20,29 @@ fn bits(count: u32) -> u32 {
     u32::BITS - count.saturating_sub(1).leading_zeros()
 }
 
+/// What entries are sorted by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum SortKey {
+    Voxels(VoxelOrder),
+    /// The first word, then the second.
+    Pairs,
+}
+
+impl SortKey {
+    /// Every key.
+    #[cfg(test)]
+    pub(crate) const ALL: [Self; 3] = [Self::Voxels(VoxelOrder::Xyz), Self::Voxels(VoxelOrder::Morton), Self::Pairs];
+
+    /// `ORDER` of `sort_key.wgsl`.
+    pub(crate) fn code(self) -> u32 {
+        match self {
+            Self::Voxels(VoxelOrder::Xyz) => 0,
+            Self::Voxels(VoxelOrder::Morton) => 1,
+            Self::Pairs => 2,
+        }
+    }
+}
+
 /// Sorts voxels of a grid.
 pub(crate) fn sort(
     gpu: &Gpu,
@@ -33,6 +56,29 @@ pub(crate) fn sort(
         VoxelOrder::Xyz => x_bits + y_bits + z_bits,
         VoxelOrder::Morton => 3 * x_bits.max(y_bits).max(z_bits),
     };
+    sort_by(gpu, entries, SortKey::Voxels(order), [key_bits, y_bits, z_bits], memory)
+}
+
+/// Sorts pairs of numbers below `first` and `second`, the latter at most 2^31.
+pub(crate) fn sort_pairs(
+    gpu: &Gpu,
+    entries: Entries,
+    first: u32,
+    second: u32,
+    memory: &mut Memory,
+) -> Result<Entries, GpuError> {
+    let low = bits(second);
+    sort_by(gpu, entries, SortKey::Pairs, [bits(first) + low, 0, low], memory)
+}
+
+/// By the lowest `key_bits` of the keys.
+fn sort_by(
+    gpu: &Gpu,
+    entries: Entries,
+    key: SortKey,
+    [key_bits, y_bits, z_bits]: [u32; 3],
+    memory: &mut Memory,
+) -> Result<Entries, GpuError> {
     let length = entries.length;
     if length < 2 {
         return Ok(entries);
@@ -49,9 +95,9 @@ pub(crate) fn sort(
             let [parameters, to] = [Bound::Words(&parameters), Bound::Buffer(to)];
             [(0, parameters), (1, Bound::Buffer(&from.buffer)), (2, Bound::Buffer(sums.numbers())), (3, to)]
         };
-        dispatcher.dispatch(Kernel::CountDigits(order), &bound(&to.buffer)[..3], blocks)?;
+        dispatcher.dispatch(Kernel::CountDigits(key), &bound(&to.buffer)[..3], blocks)?;
         sums.record(&mut dispatcher)?;
-        dispatcher.dispatch(Kernel::MoveEntries(order), &bound(&to.buffer), blocks)?;
+        dispatcher.dispatch(Kernel::MoveEntries(key), &bound(&to.buffer), blocks)?;
         std::mem::swap(&mut from, &mut to);
     }
     dispatcher.submit()?;

@@ -20,6 +20,7 @@ fn balanced(
             count(COUNT_INVOCATIONS, 1u);
         }
         let triangle = triangle_of_pair(pair);
+        painting = triangle;
         column = pair - before[triangle];
         if column == 0u || local == 0u {
             ready[local] = triangle_of(shape_of(corners(triangle)));

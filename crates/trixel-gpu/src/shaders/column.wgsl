@@ -110,6 +110,17 @@ fn voxelize_column(t: Triangle, a: i32, b: i32) -> bool {
         set_run(t.base.xy + vec2<i32>(a, b), t.base.z + range.x, t.base.z + range.y);
         return true;
     }
+    if MODE == SHELL {
+        // Thrice the width of the cubes above each other at most, and one more for the rounding.
+        var met = false;
+        for (var c = range.x; c <= range.y; c++) {
+            if visit(t, a, b, c, range.y) == 1u {
+                set_across(t.base + vec3<i32>(a, b, c), axis, 1u, 0);
+                met = true;
+            }
+        }
+        return met;
+    }
     // The plane of the dominant axis leaves at most four.
     var bits = visit(t, a, b, range.x, range.y) | visit(t, a, b, range.x + 1, range.y) << 1u;
     if range.x + 2 <= range.y {

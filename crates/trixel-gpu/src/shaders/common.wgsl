@@ -4,10 +4,16 @@ const CONSERVATIVE: u32 = 0u;
 const THIN: u32 = 1u;
 const SOLID: u32 = 2u;
 const SLICED: u32 = 3u;
+// Not a mode of its own: the triangles that meet the cube of two voxels' width around a voxel's centre, which are those that
+// count for a solid's attributes. The twin of `Shell` in `fragments.rs`.
+const SHELL: u32 = 4u;
 
 // S, lattice steps along a voxel.
 const STEPS: i32 = 65536;
 const WORKGROUP: u32 = 64u;
+
+// The triangle that this invocation paints, for entries that name it.
+var<private> painting: u32 = 0u;
 
 struct Params {
     // The grid, all of it.

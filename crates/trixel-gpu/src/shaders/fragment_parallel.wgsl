@@ -29,6 +29,7 @@ fn dilate(@builtin(vertex_index) index: u32) -> Varyings {
     }
     let t = triangle_of(shape);
     var v = pack(t);
+    v.low.w = triangle;
     let pixel = dilated(t, corner) + vec2<f32>(t.base.xy - window_corner(t.flags & AXIS_MASK));
     v.position = clip_space(pixel, 0.5);
     return v;
@@ -37,6 +38,7 @@ fn dilate(@builtin(vertex_index) index: u32) -> Varyings {
 @fragment
 fn fragment_parallel(v: Varyings) -> @location(0) vec4<f32> {
     let t = unpack(v);
+    painting = v.low.w;
     count_too_large(t.flags);
     if (t.flags & EMPTY) != 0u {
         return vec4<f32>(0.0);

@@ -42,6 +42,7 @@ fn voxelize_in_slice(t: Triangle, triangle: u32, a: i32, b: i32, slice: i32) -> 
 @fragment
 fn slice(v: Varyings) -> @location(0) vec4<f32> {
     let t = unpack(v);
+    painting = v.low.z - params.first_triangle;
     count_too_large(t.flags);
     if (t.flags & EMPTY) != 0u {
         return vec4<f32>(0.0);

@@ -2,6 +2,8 @@
 
 const XYZ: u32 = 0u;
 const MORTON: u32 = 1u;
+// Any two words.
+const PAIRS: u32 = 2u;
 
 // Puts two zeros between each two of the ten lowest bits.
 fn spread(coordinate: u32) -> u32 {
@@ -23,6 +25,9 @@ fn join(high: u32, low: u32, bits: u32) -> vec2<u32> {
 
 // The key of an entry of a grid with so many bits of y and z; low word first.
 fn key_of(entry: vec2<u32>, y_bits: u32, z_bits: u32) -> vec2<u32> {
+    if ORDER == PAIRS {
+        return join(entry.x, entry.y, z_bits);
+    }
     let voxel = voxel_of(entry);
     if ORDER == MORTON {
         let low = morton_30(voxel);

@@ -69,8 +69,9 @@ fn shape_of(t: Corners) -> Shape {
     var s: Shape;
     let low = min(min(t.v0, t.v1), t.v2);
     let high = max(max(t.v0, t.v1), t.v2);
-    let base = (low - 1) >> vec3<u32>(16u);
-    let top = high >> vec3<u32>(16u);
+    let grow = select(0, STEPS / 2, MODE == SHELL);
+    let base = (low - grow - 1) >> vec3<u32>(16u);
+    let top = (high + grow) >> vec3<u32>(16u);
     // A solid's triangle below the grid still toggles its columns, all of them from the bottom.
     let reach = overlap_voxels();
     let outside = any(base.xy > slab_high().xy) || any(top.xy < slab_low().xy) || base.z - reach > slab_high().z
@@ -159,6 +160,8 @@ fn edge_threshold(na: i32, nb: i32, va: i32, vb: i32) -> vec2<i32> {
     var round = STEPS - 1;
     if MODE == CONSERVATIVE {
         reach = 2 * (max(na, 0) + max(nb, 0));
+    } else if MODE == SHELL {
+        reach += 2 * (abs(na) + abs(nb));
     } else if MODE == THIN {
         reach += max(abs(na), abs(nb));
     } else if !(na > 0 || (na == 0 && nb > 0)) {
@@ -260,6 +263,10 @@ fn lower_shift(a_positive: bool, b_positive: bool) -> vec3<i32> {
         case CONSERVATIVE: { return vec3<i32>(select(0, STEPS, a_positive), select(0, STEPS, b_positive), STEPS); }
         case THIN: { return vec3<i32>(half, half, STEPS); }
         case SOLID: { return vec3<i32>(half, half, half); }
+        case SHELL: {
+            let reach = STEPS + half;
+            return vec3<i32>(select(-half, reach, a_positive), select(-half, reach, b_positive), reach);
+        }
         default: { return vec3<i32>(half, half, STEPS + params.overlap); }
     }
 }
@@ -271,6 +278,10 @@ fn upper_shift(a_negative: bool, b_negative: bool) -> vec3<i32> {
         case CONSERVATIVE: { return vec3<i32>(select(0, STEPS, a_negative), select(0, STEPS, b_negative), 0); }
         case THIN: { return vec3<i32>(half, half, 0); }
         case SOLID: { return vec3<i32>(half, half, half); }
+        case SHELL: {
+            let reach = STEPS + half;
+            return vec3<i32>(select(-half, reach, a_negative), select(-half, reach, b_negative), -half);
+        }
         default: { return vec3<i32>(half, half, -params.overlap); }
     }
 }

@@ -18,6 +18,7 @@ fn triangle_list(
     }
     let shape = shape_of(corners(list[i]));
     if (shape.flags & EMPTY) == 0u {
+        painting = list[i];
         voxelize_columns(triangle_of(shape), params.first_column);
         flush_counters();
     }

@@ -25,6 +25,7 @@ fn triangle_parallel(
         list[atomicAdd(&listed, VERTICES) / VERTICES] = i;
         return;
     }
+    painting = i;
     voxelize_columns(triangle_of(look.shape), 0u);
     flush_counters();
 }

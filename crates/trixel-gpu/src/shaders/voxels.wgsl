@@ -5,6 +5,8 @@ const TO_BITS: u32 = 0u;
 const TO_LIST: u32 = 1u;
 // To a list alone, once for every triangle.
 const TO_FRAGMENTS: u32 = 2u;
+// To a list alone, with the triangle.
+const TO_PAIRS: u32 = 3u;
 
 @group(0) @binding(3) var<storage, read_write> voxels: array<atomic<u32>>;
 
@@ -14,7 +16,7 @@ fn column_start(column: vec2<i32>) -> u32 {
 
 // Sets the voxels of a column that the bits of its word `index` name.
 fn or_word(column: vec2<i32>, index: u32, bits: u32) {
-    if SINK == TO_FRAGMENTS {
+    if SINK == TO_FRAGMENTS || SINK == TO_PAIRS {
         append(vec2<u32>(column), 32u * index, bits);
         count_write(countOneBits(bits));
         return;

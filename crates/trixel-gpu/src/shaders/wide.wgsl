@@ -87,3 +87,17 @@ fn i96_to_f32(a: vec3<u32>) -> f32 {
     let f = (f32(m.z) * 4294967296.0 + f32(m.y)) * 4294967296.0 + f32(m.x);
     return select(f, -f, negative);
 }
+
+// The lowest 96 bits of a product.
+fn i96_product(a: vec2<u32>, b: vec2<u32>) -> vec3<u32> {
+    var product = vec3<u32>(mul_u32(a.x, b.x), a.y * b.y);
+    product = i96_add(product, vec3<u32>(0u, mul_u32(a.x, b.y)));
+    product = i96_add(product, vec3<u32>(0u, mul_u32(a.y, b.x)));
+    // As in i96_mul.
+    product.z -= select(0u, b.x, i64_is_negative(a)) + select(0u, a.x, i64_is_negative(b));
+    return product;
+}
+
+fn i96_sub(a: vec3<u32>, b: vec3<u32>) -> vec3<u32> {
+    return i96_add(a, i96_neg(b));
+}

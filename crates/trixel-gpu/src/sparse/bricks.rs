@@ -11,12 +11,12 @@ use crate::lists::{Entries, GpuVoxelList};
 /// `u32` words of a brick.
 const BRICK_WORDS: u32 = 16;
 /// A brick is 2^3 voxels wide.
-const SHIFT: u32 = 3;
+pub(super) const SHIFT: u32 = 3;
 
 /// The set voxels of a grid as bricks of 8 x 8 x 8 bits in buffers of a [`Gpu`], along the Morton curve.
 #[derive(Debug)]
 pub struct GpuBrickMap {
-    grid: Grid,
+    pub(super) grid: Grid,
     places: Entries,
     bits: wgpu::Buffer,
 }

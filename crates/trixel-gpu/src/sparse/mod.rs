@@ -1,10 +1,13 @@
 //! Sparse structures on the GPU, built from a list along the Morton curve and equal to the CPU's.
 
 mod bricks;
+mod march;
 mod octree;
 
 pub use bricks::GpuBrickMap;
+pub use march::GridRay;
 pub use octree::GpuOctree;
+use octree::height_of;
 
 use crate::error::GpuError;
 use crate::kernel::{Bound, Dispatcher, Kernel};

@@ -16,16 +16,16 @@ use crate::prefix_sum::PrefixSum;
 /// A sparse voxel octree without attributes in a buffer of a [`Gpu`]: the nodes of [`Octree`].
 #[derive(Debug)]
 pub struct GpuOctree {
-    grid: Grid,
+    pub(super) grid: Grid,
     nodes: Entries,
-    everything: bool,
+    pub(super) everything: bool,
 }
 
 /// A coordinate outside every grid that fits an entry.
 const BEYOND: u32 = 0xffff;
 
 /// Levels of nodes over a grid: the root's cube is 2^height voxels wide.
-fn height_of(grid: &Grid) -> u32 {
+pub(super) fn height_of(grid: &Grid) -> u32 {
     let longest = grid.dims().into_iter().max().unwrap_or(1);
     longest.next_power_of_two().trailing_zeros().max(1)
 }

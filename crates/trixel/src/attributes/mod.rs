@@ -76,6 +76,7 @@
 
 mod combine;
 mod described;
+pub mod device;
 pub(crate) mod light;
 mod nearest;
 mod overlap;
@@ -258,6 +259,12 @@ impl AttributeRequest {
         self.combine
     }
 
+    /// Whether any material has a priority.
+    #[must_use]
+    pub fn has_priorities(&self) -> bool {
+        self.priorities.iter().any(|priority| *priority > 0)
+    }
+
     fn wanted(&self) -> Wanted {
         let has = |kind| self.kinds.contains(&kind);
         use AttributeKind as Kind;
@@ -354,26 +361,47 @@ impl Values {
     /// Appends what `row` has of `kind`.
     fn push(&mut self, kind: AttributeKind, row: &Row) {
         use AttributeKind as Kind;
-        #[expect(
-            clippy::cast_precision_loss,
-            clippy::cast_possible_truncation,
-            reason = "values of at most 24 bits; larger ones are rounded"
-        )]
+        #[expect(clippy::cast_precision_loss, reason = "values of at most 17 bits")]
         match self {
             Self::U8x4(values) => values.push(light::encode(row.color)),
             Self::F32x2(values) if kind == Kind::Texcoord => {
-                values.push(row.coordinate.map(|c| c as f32 / (1u32 << COORDINATE_BITS) as f32));
+                values.push(row.coordinate.map(coordinate_float));
             }
-            Self::F32x2(values) => values.push(row.metallic_roughness.map(|v| f32::from(v) / f32::from(light::FULL))),
+            Self::F32x2(values) => values.push(row.metallic_roughness.map(fraction_float)),
             Self::F32x3(values) => values.push(match kind {
                 Kind::Normal => vector::floats(row.normal),
                 Kind::GeometricNormal => vector::floats(row.geometric_normal),
                 Kind::Barycentric => row.weights.map(|w| w as f32 / (1u32 << nearest::WEIGHT_BITS) as f32),
-                _ => row.emission.map(|e| (f64::from(e) / f64::from(EMISSION_ONE)) as f32),
+                _ => row.emission.map(emission_float),
             }),
             Self::U32(values) => values.push(if kind == Kind::Material { row.material } else { row.triangle }),
         }
     }
+}
+
+/// The float of a texture coordinate, rounded.
+fn coordinate_float(coordinate: i64) -> f32 {
+    #[expect(clippy::cast_precision_loss, reason = "rounded to 24 bits")]
+    let float = coordinate as f32 / (1u32 << COORDINATE_BITS) as f32;
+    float
+}
+
+/// The float of a fraction.
+fn fraction_float(fraction: u16) -> f32 {
+    f32::from(fraction) / f32::from(light::FULL)
+}
+
+/// The float of emitted light, rounded.
+fn emission_float(emission: u32) -> f32 {
+    #[expect(clippy::cast_possible_truncation, reason = "rounded to 24 bits")]
+    let float = (f64::from(emission) / f64::from(EMISSION_ONE)) as f32;
+    float
+}
+
+/// The names of a mesh's materials, where a request asks for materials.
+fn material_names(mesh: &Mesh, request: &AttributeRequest) -> Vec<String> {
+    let asked = request.kinds.contains(&AttributeKind::Material);
+    mesh.materials.iter().filter(|_| asked).map(|material| material.name.clone()).collect()
 }
 
 /// The attributes of a volume's set voxels, in the order of their ranks.
@@ -516,11 +544,10 @@ pub fn compute(
     #[cfg(not(feature = "threads"))]
     let parts: Vec<Part> = (0..work.count()).map(|index| task.run(&work.slab(index))).collect();
     let surface_mode = job.mode() != Mode::Solid;
-    let mut attributes = join(parts, request, rank.count(), surface_mode);
-    if attributes.get(AttributeKind::Material).is_some() {
-        attributes.material_names = mesh.materials.iter().map(|material| material.name.clone()).collect();
-    }
-    Ok(attributes)
+    Ok(VoxelAttributes {
+        material_names: material_names(mesh, request),
+        ..join(parts, request, rank.count(), surface_mode)
+    })
 }
 
 /// The rows of one slab.

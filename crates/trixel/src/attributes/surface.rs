@@ -1,5 +1,6 @@
 //! What a mesh's surface is like at a point of a triangle: colour, normals, emission and the rest, in integers.
 
+use super::device::MATERIAL_WORDS;
 use super::light::{FULL, multiply, quantize};
 use super::nearest::{WEIGHT_BITS, Weights};
 use super::texture::{Encoding, Placement, Texels};
@@ -38,9 +39,9 @@ struct Prepared<'a> {
 }
 
 /// A texture that a material uses.
-struct Slot<'a> {
+pub(super) struct Slot<'a> {
     used: TextureRef,
-    texels: &'a Texels<'a>,
+    pub(super) texels: &'a Texels<'a>,
 }
 
 /// The textures of a mesh that can be sampled.
@@ -119,6 +120,23 @@ impl<'a> Surface<'a> {
         if (material as usize) < self.materials.len() { material } else { Mesh::NO_MATERIAL }
     }
 
+    /// The row of that material in [`Self::material_words`].
+    pub(super) fn material_row(&self, triangle: u32) -> u32 {
+        let rows = u32::try_from(self.materials.len()).unwrap_or(Mesh::NO_MATERIAL);
+        self.material(triangle).min(rows)
+    }
+
+    /// The materials as [`super::device::DeviceSurface::materials`] has them, with each one's priority.
+    pub(super) fn material_words(&self, priority: impl Fn(usize) -> u32) -> Vec<u32> {
+        let rows = self.materials.iter().chain([&self.plain]).enumerate();
+        let words = rows.flat_map(|(i, material)| {
+            let there = i < self.materials.len();
+            let number = if there { u32::try_from(i).unwrap_or(Mesh::NO_MATERIAL) } else { Mesh::NO_MATERIAL };
+            material.words(if there { priority(i) } else { 0 }, number)
+        });
+        words.collect()
+    }
+
     /// Whether fragments of a triangle may be cut out by the alpha test.
     pub(super) fn is_masked(&self, triangle: u32) -> bool {
         let material = self.materials.get(self.material(triangle) as usize);
@@ -179,6 +197,48 @@ impl<'a> Surface<'a> {
         // One scale for all axes keeps directions and avoids overflow far from unit size.
         let scale = self.voxel_size.iter().fold(0.0, |largest: f64, &size| largest.max(size));
         (vector::quantized(cross([scale; 3])).unwrap_or([0; 3]), area)
+    }
+}
+
+impl Prepared<'_> {
+    fn words(&self, priority: u32, number: u32) -> [u32; MATERIAL_WORDS] {
+        let [r, g, b, a] = self.color.map(u32::from);
+        let [metallic, roughness] = self.metallic_roughness.map(u32::from);
+        let (mode, cutoff) = match self.alpha_mode {
+            AlphaMode::Opaque => (0, 0),
+            AlphaMode::Mask { cutoff } => (1, u32::from(quantize(cutoff))),
+            AlphaMode::Blend => (2, 0),
+        };
+        let [er, eg, eb] = self.emission;
+        [r | g << 16, b | a << 16, er, eg, eb, metallic | roughness << 16, mode, cutoff, priority, number]
+    }
+}
+
+impl<'s> Patch<'s> {
+    /// The vertex colours of the corners.
+    pub(super) fn colors(&self) -> Option<&[[u16; 4]; 3]> {
+        self.colors.as_ref()
+    }
+
+    /// The shading normals of the corners.
+    pub(super) fn normals(&self) -> Option<&[[i64; 3]; 3]> {
+        self.normals.as_ref()
+    }
+
+    /// The texture coordinates of the corners.
+    pub(super) fn coordinates(&self) -> Option<&[[i64; 2]; 3]> {
+        self.uvs.as_ref()
+    }
+
+    /// The textures of colour, opacity, emission, and metalness and roughness, with the corners' places in them.
+    pub(super) fn placed(&self) -> [Option<(&'s Slot<'s>, &Placement)>; 4] {
+        let material = self.material;
+        [
+            material.color_texture.as_ref().zip(self.color.as_ref()),
+            material.opacity_texture.as_ref().zip(self.opacity.as_ref()),
+            material.emission_texture.as_ref().zip(self.emission.as_ref()),
+            material.metallic_roughness_texture.as_ref().zip(self.metallic_roughness.as_ref()),
+        ]
     }
 }
 

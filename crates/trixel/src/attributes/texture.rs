@@ -1,6 +1,7 @@
 //! Textures in integers: texel coordinates with 8 bits below a texel, bilinear filtering, and coarser levels for
 //! textures that are finer than the voxels (L. Williams, *Pyramidal Parametrics*, 1983).
 
+use super::device::DeviceLevel;
 use super::light::{FULL, linear_of_srgb, narrow, widen};
 use super::nearest::{WEIGHT_BITS, Weights};
 use crate::material::{Filter, Image, ImageSource, Texture, TextureRef, Wrap};
@@ -8,8 +9,8 @@ use crate::material::{Filter, Image, ImageSource, Texture, TextureRef, Wrap};
 /// Bits of a texel coordinate below one texel.
 const TEXEL_BITS: u32 = 8;
 const TEXEL: i64 = 1 << TEXEL_BITS;
-/// The farthest texel coordinate that is kept.
-const FARTHEST: f64 = (1u32 << 30) as f64;
+/// The farthest texel coordinate that is kept; differences of two then fit 32 bits.
+const FARTHEST: f64 = (1u32 << 29) as f64;
 
 /// What an image's colour channels hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,8 +40,8 @@ struct Level {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placement {
     /// Texel coordinates of the corners.
-    corners: [[i64; 2]; 3],
-    level: usize,
+    pub(super) corners: [[i64; 2]; 3],
+    pub(super) level: usize,
 }
 
 impl<'a> Texels<'a> {
@@ -103,6 +104,32 @@ impl<'a> Texels<'a> {
             Encoding::Srgb => [linear_of_srgb(r), linear_of_srgb(g), linear_of_srgb(b), widen(a)],
             Encoding::Linear => [r, g, b, a].map(widen),
         }
+    }
+
+    /// A level as a device reads it.
+    pub(super) fn device_level(&self, level: usize) -> DeviceLevel {
+        let size = self.size_of(level);
+        let wrap = self.wrap.map(|wrap| match wrap {
+            Wrap::Repeat => 0,
+            Wrap::Mirror => 1,
+            Wrap::Clamp => 2,
+        });
+        let (format, texels) = match (level.checked_sub(1).and_then(|above| self.levels.get(above)), self.encoding) {
+            (Some(level), _) => {
+                let words = level.texels.iter().flat_map(|texel| {
+                    let [r, g, b, a] = texel.map(u32::from);
+                    [r | g << 16, b | a << 16]
+                });
+                (2, words.collect())
+            }
+            (None, encoding) => {
+                let words = self.pixels.as_chunks::<4>().0.iter().map(|texel| u32::from_le_bytes(*texel));
+                (u32::from(encoding == Encoding::Linear), words.collect())
+            }
+        };
+        let nearest = u32::from(self.filter == Filter::Nearest);
+        let flags = wrap[0] | wrap[1] << 2 | nearest << 4 | format << 5;
+        DeviceLevel { size, base: self.size, flags, texels }
     }
 
     /// Places a triangle whose corners have the texture coordinates `uvs` and whose area is `area` voxels squared.

@@ -217,17 +217,17 @@ fn deform(part: &Part, deformers: &Deformers, weights: &[f64], place: &Place<'_>
     for (target, &weight) in driven() {
         add_weighted(&mut positions, &target.positions, weight);
     }
+    let places: Vec<Affine> = (0..positions.len()).map(|vertex| place.of(vertex)).collect();
     let new = mesh.positions.iter_mut().skip(start.vertex).zip(&positions);
-    new.enumerate().for_each(|(vertex, (slot, &position))| *slot = place.of(vertex).point(position));
+    new.zip(&places).for_each(|((slot, &position), place)| *slot = place.point(position));
 
     let (Some(rest), Some(all)) = (&part.normals, &mut mesh.normals) else { return };
     let mut normals: Vec<[f64; 3]> = rest.values.iter().map(|n| n.map(f64::from)).collect();
     for (target, &weight) in driven() {
         add_weighted(&mut normals, &target.normals, weight);
     }
-    for (vertex, (slot, normal)) in all.values.iter_mut().skip(start.normal).zip(&normals).enumerate() {
-        *slot = unit_normal(&place.of(vertex).normals(), normal.map(narrow));
-    }
+    let new = all.values.iter_mut().skip(start.normal).zip(&normals);
+    new.zip(&places).for_each(|((slot, normal), place)| *slot = unit_normal(&place.normals(), normal.map(narrow)));
 }
 
 #[cfg(test)]
