@@ -137,9 +137,8 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
 
     if let Some(FillReport { questionable, uncorrected }) = ran.fill {
         reporter.say(&format!(
-            "filled between slices ({}): {questionable} columns were questionable, {uncorrected} of them past correction; \
-             `trixel verify --mode solid` lists what differs from the exact solid",
-            fill
+            "filled between slices ({fill}): {questionable} columns were questionable, {uncorrected} of them past correction; \
+             `trixel verify --mode solid` lists what differs from the exact solid"
         ));
     }
     let count = voxels.count();
