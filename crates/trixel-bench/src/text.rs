@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use crate::published::{HCV, HCV_HARDWARE};
-use crate::results::Results;
+use crate::published::{CL, CL_HARDWARE, CL_RESOLUTIONS, HCV, HCV_HARDWARE};
+use crate::results::{self, Results};
 
 /// Rows of cells under a head, each column as wide as it must be; the first is left-aligned.
-fn aligned(rows: &[Vec<String>]) -> String {
+pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {
         rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max().unwrap_or(0)
@@ -41,6 +41,8 @@ pub fn table(results: &Results) -> String {
     let columns = results.columns();
     let mut head = vec!["mesh".to_owned(), "triangles".to_owned(), "at".to_owned()];
     head.extend(columns.iter().map(|(_, strategy)| (*strategy).to_owned()));
+    let compared = columns.contains(&results::SLICED) && columns.contains(&results::SLICE_PER_PASS);
+    head.extend(compared.then(|| "ratio".to_owned()));
     head.extend(["@voxels^2".to_owned(), "wrong".to_owned()]);
     let mut rows = vec![head];
     for mesh in results.meshes() {
@@ -50,6 +52,9 @@ pub fn table(results: &Results) -> String {
             let triangles = some().next().map_or(0, |cell| cell.triangles);
             let mut row = vec![mesh.to_owned(), triangles.to_string(), resolution.to_string()];
             row.extend(cells.iter().map(|cell| cell.map_or(String::new(), |cell| ms(cell.median_ms))));
+            if compared {
+                row.push(results.slicing_ratio(mesh, resolution).map_or(String::new(), |ratio| format!("{ratio:.1}")));
+            }
             row.push(some().find_map(|cell| cell.cutoff).map_or(String::new(), |cutoff| format!("{cutoff:.1}")));
             row.push(some().map(|cell| cell.wrong_voxels).sum::<u64>().to_string());
             rows.push(row);
@@ -96,6 +101,26 @@ pub fn published() -> String {
         ]);
     }
     format!("As published, not measured here: {HCV_HARDWARE}\n\n{}", aligned(&rows))
+}
+
+/// \[CL\] table 1 as the paper has it, with the ratio of its columns.
+#[must_use]
+pub fn published_cl() -> String {
+    let head = ["mesh", "triangles", "at", "sliced", "slice-per-pass", "ratio"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for row in &CL {
+        for ((resolution, sliced), per_pass) in CL_RESOLUTIONS.iter().zip(row.sliced).zip(row.slice_per_pass) {
+            rows.push(vec![
+                row.model.to_owned(),
+                row.triangles.to_string(),
+                resolution.to_string(),
+                ms(sliced),
+                ms(per_pass),
+                format!("{:.1}", per_pass / sliced),
+            ]);
+        }
+    }
+    format!("As published, not measured here: {CL_HARDWARE}\n\n{}", aligned(&rows))
 }
 
 /// What the shaders counted.

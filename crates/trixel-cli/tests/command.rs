@@ -597,6 +597,56 @@ fn a_killed_run_is_resumed_and_gives_the_identical_result() {
 }
 
 #[test]
+fn slices_by_both_strategies() {
+    let bench = Bench::new();
+    bench.ok("voxelize scene:torus:24 -r 30 --mode sliced --overlap 0.25 -q -o cpu.npz");
+    for strategy in ["sliced", "slice-per-pass"] {
+        let asked = format!("--mode sliced --overlap 0.25 --strategy {strategy} --adapter llvmpipe");
+        bench.ok(&format!("voxelize scene:torus:24 -r 30 {asked} -q -o gpu.npz --report r.json"));
+        bench.ok("verify gpu.npz scene:torus:24 --mode sliced --overlap 0.25");
+        let report: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("r.json")).unwrap()).unwrap();
+        assert_eq!((&report["strategy"], &report["fill"]), (&strategy.into(), &serde_json::Value::Null));
+    }
+    let refused = "voxelize scene:cube -o a.npz --strategy sliced";
+    bench.fails(2, refused, &["--strategy sliced", "--mode sliced", "conservative"]);
+}
+
+#[test]
+fn solids_are_filled_in_three_ways() {
+    let bench = Bench::new();
+    for fill in ["parity", "xor", "march"] {
+        let arguments = format!("scene:torus:24 -r 40 --mode solid --fill {fill} -q");
+        bench.ok(&format!("voxelize {arguments} -o cpu-{fill}.npz --report r.json"));
+        bench.ok(&format!("voxelize {arguments} --adapter llvmpipe -o gpu-{fill}.npz"));
+        let verify = format!("verify gpu-{fill}.npz scene:torus:24 --mode solid");
+        bench.ok(&format!("{verify} --fill {fill}"));
+        // Against the exact solid only one is right.
+        let ran = bench.run(&format!("{verify} --list 1"));
+        assert_eq!(ran.stdout.contains(": equal"), fill == "parity", "{}", ran.stdout);
+        let report: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("r.json")).unwrap()).unwrap();
+        assert_eq!(report["fill"]["name"], fill);
+        assert_eq!(report["fill"]["uncorrected_columns"].is_null(), fill == "parity");
+    }
+    bench.fails(2, "voxelize scene:cube -o a.npz --fill xor", &["--fill", "--mode solid"]);
+    bench.fails(2, "voxelize scene:cube -o a.zarr --mode solid --fill xor", &["--fill", ".zarr"]);
+    bench.ok("voxelize scene:cube -r 20 -o sparse.npz --sparse --mode solid --fill march");
+}
+
+#[test]
+fn bench_compares_slicing_and_fills() {
+    let bench = Bench::new();
+    let ran = bench.ok("bench --table cl scene:torus:12 -r 16 --adapter llvmpipe --repeat 1 --html r.html");
+    for said in ["mode sliced", "slice-per-pass  ratio", "HD5850", "1282", "53.8"] {
+        assert!(ran.stdout.contains(said), "no {said} in {}", ran.stdout);
+    }
+    assert!(std::fs::read_to_string(bench.path("r.html")).unwrap().contains("HD5850"));
+    let ran = bench.ok("bench --table fills scene:torus -r 20,45");
+    assert_eq!(ran.stdout.lines().filter(|line| line.starts_with("torus")).count(), 16, "{}", ran.stdout);
+    bench.fails(2, "bench --table fills --json r.json", &["--table fills", "--json"]);
+    bench.fails(2, "bench scene:cube --strategy sliced", &["sliced", "conservative"]);
+}
+
+#[test]
 fn out_of_core_says_what_is_wrong() {
     let bench = Bench::new();
     bench.fails(2, "voxelize scene:cube -o a.npz --memory-limit 1GiB", &["--memory-limit", ".zarr"]);

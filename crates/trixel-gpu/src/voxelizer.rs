@@ -19,13 +19,20 @@ use crate::timer::{PassTime, Timer};
 use crate::volume::GpuVolume;
 
 /// The strategies of this backend.
-pub const STRATEGIES: [Strategy; 5] = [
+pub const STRATEGIES: [Strategy; 7] = [
     Strategy::TriangleParallel,
     Strategy::FragmentParallel,
     Strategy::Hybrid,
     Strategy::HybridTwoPass,
     Strategy::Balanced,
+    Strategy::Sliced,
+    Strategy::SlicePerPass,
 ];
+
+/// The strategies of this backend that have a mode.
+pub fn strategies_of(mode: Mode) -> impl Iterator<Item = Strategy> {
+    STRATEGIES.into_iter().filter(move |strategy| strategy.modes().contains(&mode))
+}
 
 /// How to voxelize; nothing here changes which voxels are set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -104,6 +111,9 @@ impl Voxelizer {
             strategy if STRATEGIES.contains(&strategy) => strategy,
             other => return Err(GpuError::Strategy(other)),
         };
+        if !strategy.modes().contains(&job.mode()) {
+            return Err(GpuError::StrategyOfOtherModes { strategy, mode: job.mode() });
+        }
         Ok(Self {
             gpu: gpu.clone(),
             job: *job,
@@ -370,8 +380,12 @@ impl Voxelizer {
         if too_large > 0 {
             return Err(GpuError::TrianglesTooLarge(too_large));
         }
-        if totals.iter().any(|total| *total > MAX_PAIRS) {
-            return Err(GpuError::TooManyColumns);
+        let (most, error) = match self.strategy {
+            Strategy::Sliced => (MAX_PAIRS / self.dilation.vertices(), GpuError::TooManySlices),
+            _ => (MAX_PAIRS, GpuError::TooManyColumns),
+        };
+        if totals.iter().any(|total| *total > most) {
+            return Err(error);
         }
         Ok(counters)
     }

@@ -39,11 +39,15 @@ pub enum Strategy {
     HybridTwoPass,
     /// GPU: one invocation a pair of triangle and column (\[HCV\] chapter 5).
     Balanced,
+    /// GPU, [`Mode::Sliced`] alone: each triangle once for each slice that it may meet, all in one draw (\[CL\] 2.2).
+    Sliced,
+    /// GPU, [`Mode::Sliced`] alone: the whole mesh once for each slice (Llamas 2007).
+    SlicePerPass,
 }
 
 impl Strategy {
     /// Every strategy.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Auto,
         Self::ColumnRuns,
         Self::TriangleParallel,
@@ -51,6 +55,8 @@ impl Strategy {
         Self::Hybrid,
         Self::HybridTwoPass,
         Self::Balanced,
+        Self::Sliced,
+        Self::SlicePerPass,
     ];
 
     /// The name on the command line and in reports.
@@ -64,6 +70,17 @@ impl Strategy {
             Self::Hybrid => "hybrid",
             Self::HybridTwoPass => "hybrid-two-pass",
             Self::Balanced => "balanced",
+            Self::Sliced => "sliced",
+            Self::SlicePerPass => "slice-per-pass",
+        }
+    }
+
+    /// The modes that it can do.
+    #[must_use]
+    pub fn modes(self) -> &'static [Mode] {
+        match self {
+            Self::Sliced | Self::SlicePerPass => &[Mode::Sliced],
+            _ => &Mode::ALL,
         }
     }
 }
