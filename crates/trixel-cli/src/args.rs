@@ -656,6 +656,10 @@ pub(crate) enum StrategyArg {
     HybridTwoPass,
     /// GPU: one invocation a pair of triangle and column.
     Balanced,
+    /// GPU: triangles sorted by the axes their boxes extend along, code for each case (Schwarz and Seidel 2010).
+    CaseSorted,
+    /// GPU: triangles binned to tiles and sorted, one workgroup a tile (VoxelPipe, 2011).
+    Tiled,
 }
 
 impl From<StrategyArg> for Strategy {
@@ -668,6 +672,8 @@ impl From<StrategyArg> for Strategy {
             StrategyArg::Hybrid => Self::Hybrid,
             StrategyArg::HybridTwoPass => Self::HybridTwoPass,
             StrategyArg::Balanced => Self::Balanced,
+            StrategyArg::CaseSorted => Self::CaseSorted,
+            StrategyArg::Tiled => Self::Tiled,
         }
     }
 }

@@ -19,12 +19,14 @@ use crate::timer::{PassTime, Timer};
 use crate::volume::GpuVolume;
 
 /// The strategies of this backend.
-pub const STRATEGIES: [Strategy; 5] = [
+pub const STRATEGIES: [Strategy; 7] = [
     Strategy::TriangleParallel,
     Strategy::FragmentParallel,
     Strategy::Hybrid,
     Strategy::HybridTwoPass,
     Strategy::Balanced,
+    Strategy::CaseSorted,
+    Strategy::Tiled,
 ];
 
 /// How to voxelize; nothing here changes which voxels are set.
@@ -370,8 +372,12 @@ impl Voxelizer {
         if too_large > 0 {
             return Err(GpuError::TrianglesTooLarge(too_large));
         }
-        if totals.iter().any(|total| *total > MAX_PAIRS) {
-            return Err(GpuError::TooManyColumns);
+        match totals.iter().max() {
+            Some(needed) if *needed > MAX_PAIRS => return Err(GpuError::TooManyColumns),
+            Some(&needed) if needed > status.room => {
+                return Err(GpuError::TooManyTiles { needed, room: status.room });
+            }
+            _ => {}
         }
         Ok(counters)
     }

@@ -91,7 +91,9 @@ fn more_workgroups_than_one_dimension_holds() {
     let job = Job::new(grid, Mode::Thin);
     let expected = on_cpu(&lattice, &job);
     let gpu = open("llvmpipe");
-    for strategy in [Strategy::TriangleParallel, Strategy::Hybrid, Strategy::Balanced] {
+    for strategy in
+        [Strategy::TriangleParallel, Strategy::Hybrid, Strategy::Balanced, Strategy::CaseSorted, Strategy::Tiled]
+    {
         let (found, _) = on_gpu(&gpu, &lattice, &job.with_strategy(strategy), &Options::default());
         assert!(found == expected, "{strategy}");
     }
@@ -276,10 +278,20 @@ fn counters_agree() {
                 }
                 Strategy::Hybrid => assert!(counters.fragments > 0 && counters.invocations == triangles),
                 Strategy::Balanced => assert_eq!(counters.invocations, triangles + counters.columns),
+                Strategy::CaseSorted | Strategy::Tiled => {
+                    assert!(counters.invocations >= 2 * triangles && counters.fragments == 0);
+                }
                 _ => assert!(counters.fragments > 0),
             }
-            // The same voxels are tested, whoever tests them.
-            tests.push(counters.voxel_tests);
+            let lane_use = counters.lane_use();
+            assert_eq!(lane_use.is_some(), counters.invocations > 0, "{strategy}");
+            assert!(lane_use.is_none_or(|share| share > 0.0 && share <= 1.0), "{strategy}: {lane_use:?}");
+            // The same voxels are tested, whoever tests them; but where the box's case decides, none need be.
+            if strategy == Strategy::CaseSorted {
+                assert!(tests.iter().all(|count| *count > counters.voxel_tests));
+            } else {
+                tests.push(counters.voxel_tests);
+            }
         }
     }
     assert!(tests.iter().all(|count| *count == tests[0]), "{tests:?}");

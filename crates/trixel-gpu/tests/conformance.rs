@@ -65,6 +65,8 @@ mod lavapipe {
     trixel::conformance_suite!(batched hybrid_, hybrid(&LAVAPIPE, Strategy::Hybrid));
     trixel::conformance_suite!(batched hybrid_two_pass, hybrid(&LAVAPIPE, Strategy::HybridTwoPass));
     trixel::conformance_suite!(batched balanced, plain(&LAVAPIPE, Strategy::Balanced));
+    trixel::conformance_suite!(batched case_sorted, plain(&LAVAPIPE, Strategy::CaseSorted));
+    trixel::conformance_suite!(batched tiled, plain(&LAVAPIPE, Strategy::Tiled));
 }
 
 mod swiftshader {
@@ -77,4 +79,6 @@ mod swiftshader {
     trixel::conformance_suite!(batched hybrid_, hybrid(&SWIFTSHADER, Strategy::Hybrid));
     trixel::conformance_suite!(batched hybrid_two_pass, hybrid(&SWIFTSHADER, Strategy::HybridTwoPass));
     trixel::conformance_suite!(batched balanced, plain(&SWIFTSHADER, Strategy::Balanced));
+    trixel::conformance_suite!(batched case_sorted, plain(&SWIFTSHADER, Strategy::CaseSorted));
+    trixel::conformance_suite!(batched tiled, plain(&SWIFTSHADER, Strategy::Tiled));
 }

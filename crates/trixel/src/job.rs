@@ -39,11 +39,17 @@ pub enum Strategy {
     HybridTwoPass,
     /// GPU: one invocation a pair of triangle and column (\[HCV\] chapter 5).
     Balanced,
+    /// GPU: triangles sorted by whether their boxes extend along one, two or three axes, each case by code of its own
+    /// (Schwarz and Seidel 2010; \[HCV\]'s swizzle makes three cases of their nine).
+    CaseSorted,
+    /// GPU: pairs of tile and triangle, sorted; one workgroup a tile, which blends in its own memory (Pantaleoni's VoxelPipe,
+    /// 2011).
+    Tiled,
 }
 
 impl Strategy {
     /// Every strategy.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Auto,
         Self::ColumnRuns,
         Self::TriangleParallel,
@@ -51,6 +57,8 @@ impl Strategy {
         Self::Hybrid,
         Self::HybridTwoPass,
         Self::Balanced,
+        Self::CaseSorted,
+        Self::Tiled,
     ];
 
     /// The name on the command line and in reports.
@@ -64,6 +72,8 @@ impl Strategy {
             Self::Hybrid => "hybrid",
             Self::HybridTwoPass => "hybrid-two-pass",
             Self::Balanced => "balanced",
+            Self::CaseSorted => "case-sorted",
+            Self::Tiled => "tiled",
         }
     }
 }

@@ -1,26 +1,7 @@
 // One invocation a pair of triangle and column: the even distribution of work that [HCV] chapter 5 leaves for later.
 
-// The prefix sums of the triangles' columns, and their total.
-@group(1) @binding(0) var<storage, read> before: array<u32>;
-@group(1) @binding(1) var<storage, read> total: u32;
-
 // The first invocation of each triangle in a workgroup makes it ready for the others.
 var<workgroup> ready: array<Triangle, WORKGROUP>;
-
-// The last triangle whose columns begin at or before this pair; those without columns are passed over.
-fn triangle_of_pair(pair: u32) -> u32 {
-    var low = 0u;
-    var high = params.triangles;
-    while high - low > 1u {
-        let middle = low + (high - low) / 2u;
-        if before[middle] <= pair {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
-}
 
 @compute @workgroup_size(WORKGROUP)
 fn balanced(
@@ -50,4 +31,5 @@ fn balanced(
         _ = voxelize_column(t, rect.x + i32(column % width), rect.y + i32(column / width));
         flush_counters();
     }
+    count_lanes(local);
 }
