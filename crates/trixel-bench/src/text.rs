@@ -2,11 +2,13 @@
 
 use std::fmt::Write;
 
+use trixel_gpu::Counters;
+
 use crate::published::{HCV, HCV_HARDWARE};
 use crate::results::Results;
 
 /// Rows of cells under a head, each column as wide as it must be; the first is left-aligned.
-fn aligned(rows: &[Vec<String>]) -> String {
+pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {
         rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max().unwrap_or(0)
@@ -55,14 +57,15 @@ pub fn table(results: &Results) -> String {
             rows.push(row);
         }
     }
-    let runs = results.cells.iter().map(|cell| cell.runs).max().unwrap_or(0);
+    let lists = results.lists.iter().map(|cell| cell.runs);
+    let runs = results.cells.iter().map(|cell| cell.runs).chain(lists).max().unwrap_or(0);
+    let table = if results.cells.is_empty() { String::new() } else { format!("\n{}", aligned(&rows)) };
     format!(
-        "{}\n{}, {} threads; mode {}; medians of {runs} runs in ms, without upload and download\n\n{}",
+        "{}\n{}, {} threads; mode {}; medians of {runs} runs in ms, without upload and download\n{table}",
         results.adapter_line(),
         results.machine.cpu,
         results.machine.threads,
         results.mode,
-        aligned(&rows)
     )
 }
 
@@ -98,6 +101,11 @@ pub fn published() -> String {
     format!("As published, not measured here: {HCV_HARDWARE}\n\n{}", aligned(&rows))
 }
 
+/// The share of lanes at work, as a percentage; nothing where all work was the rasterizer's.
+pub(crate) fn lane_use(counters: &Counters) -> String {
+    counters.lane_use().map_or(String::new(), |share| format!("{:.0} %", 100.0 * share))
+}
+
 /// What the shaders counted.
 #[must_use]
 pub fn counters(results: &Results) -> Option<String> {
@@ -113,6 +121,7 @@ pub fn counters(results: &Results) -> Option<String> {
         "tests",
         "written",
         "atomics",
+        "lane use",
     ];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for cell in &results.cells {
@@ -131,6 +140,7 @@ pub fn counters(results: &Results) -> Option<String> {
             counted.voxel_tests.to_string(),
             counted.voxels_written.to_string(),
             counted.atomics.to_string(),
+            lane_use(&counted),
         ]);
     }
     (rows.len() > 1).then(|| aligned(&rows))

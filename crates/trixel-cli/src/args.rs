@@ -460,6 +460,7 @@ Examples:
   trixel bench --table hcv --html report.html --json results.json
   trixel bench bunny.ply scene:room -r 256 --counters
   trixel bench --figure 3.13 --figure 3.14 scene:room --html sweep.html
+  trixel bench --lists bunny.ply scene:room
   trixel bench --compare results.json";
 
 #[derive(Debug, Args)]
@@ -480,6 +481,10 @@ pub(crate) struct BenchArgs {
     /// Measure what this figure of Rauwendaal 2012 needs; 3.13 and 3.14 sweep the hybrid's cutoff. --html shows it.
     #[arg(long = "figure", value_enum, value_name = "NUMBER")]
     pub(crate) figures: Vec<FigureArg>,
+
+    /// Compare the methods of listing voxels on the GPU instead of the strategies: time, memory, wrong entries.
+    #[arg(long, conflicts_with_all = ["table", "figures", "strategy", "cutoff", "counters"])]
+    pub(crate) lists: bool,
 
     /// Voxels along the longest side of the grid.
     #[arg(short, long = "resolution", value_delimiter = ',', value_name = "N,...", default_value = "128,256,512",

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use trixel::{Mode, Strategy};
 use trixel_bench::measure::Plan;
 use trixel_bench::results::SCHEMA;
-use trixel_bench::{Results, compare, html, text};
+use trixel_bench::{Results, compare, html, lists, text};
 use trixel_gpu::{AdapterChoice, Gpu, GpuError, STRATEGIES};
 use trixel_io::atomic_file::{AtomicFile, Staged};
 
@@ -35,6 +35,9 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
     }
     let reporter = Reporter::new(false);
     let gpu = open(args, &reporter)?;
+    if args.lists && gpu.is_none() {
+        usage("--lists compares what GPUs do, and there is none here; a software one will do");
+    }
     // The paper's table is of thin voxels.
     let default_mode = if args.table == Some(TableArg::Hcv) { Mode::Thin } else { Mode::Conservative };
     let plan = Plan {
@@ -46,6 +49,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
         cutoff: args.cutoff,
         count: args.counters,
         sweep: sweep(&args.figures),
+        lists: args.lists,
     };
 
     let mut results = Results::new(gpu.as_ref(), plan.mode);
@@ -67,6 +71,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
     reporter.finish();
 
     let mut parts = vec![text::table(&results)];
+    parts.extend(lists::text(&results));
     parts.extend(text::counters(&results));
     parts.extend(text::sweeps(&results));
     parts.extend(args.table.map(|TableArg::Hcv| text::published()));

@@ -196,7 +196,8 @@ pub(crate) struct Raster {
 impl Raster {
     pub(crate) const VERTEX_ENTRY_POINT: &str = "dilate";
     pub(crate) const FRAGMENT_ENTRY_POINT: &str = "fragment_parallel";
-    const FILES: &[&str] = shader!("wide" "common" "triangle" "column" "voxels" "runs" "direct" "counters" "fragment_parallel");
+    const FILES: &[&str] =
+        shader!("wide" "common" "triangle" "column" "voxels" "runs" "direct" "counters" "fragment_parallel");
 }
 
 /// What a pipeline is specialized for.
@@ -306,8 +307,8 @@ fn front(small: bool, flat: bool, tiled: bool) -> String {
 /// The WGSL of a vertex and a fragment stage.
 pub(crate) fn raster_source(raster: Raster, variant: Variant, tier: Tier) -> String {
     let (listed, dilation) = (raster.listed, raster.dilation.code());
-    let constants = front(false, false, false)
-        + &format!("const LISTED: bool = {listed};\nconst DILATION: u32 = {dilation}u;\n");
+    let constants =
+        front(false, false, false) + &format!("const LISTED: bool = {listed};\nconst DILATION: u32 = {dilation}u;\n");
     assemble(variant, tier, &constants, Raster::FILES, true)
 }
 

@@ -34,7 +34,8 @@ impl TileCounts {
     /// The most pairs of triangle and tile in a part of a grid that has so many tiles, where slices overlap by so many voxels.
     pub(crate) fn most(&self, tiles: u64, overlap_voxels: u32) -> u64 {
         // Each triangle's tiles along z, and those that the overlaps on both sides add to them.
-        let times = if overlap_voxels == 0 { 1 } else { 2 + u64::from((2 * overlap_voxels).div_ceil(1 << TILE_SHIFT[2])) };
+        let times =
+            if overlap_voxels == 0 { 1 } else { 2 + u64::from((2 * overlap_voxels).div_ceil(1 << TILE_SHIFT[2])) };
         let most = |(triangles, sum): &(u64, u64)| (sum * times).min(triangles * tiles);
         self.0.iter().map(most).sum()
     }

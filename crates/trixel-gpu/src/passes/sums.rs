@@ -66,11 +66,12 @@ impl Recorder<'_> {
             .collect();
         let words = WordSets::new(gpu, &lengths)?;
         let totals = scan.levels.iter().skip(1).chain([&scan.total]);
-        let levels = scan.levels.iter().zip(totals).zip((0..).zip(&lengths)).map(|((data, totals), (level, [length]))| {
-            let resources = [words.binding(), data.as_entire_binding(), totals.as_entire_binding()];
-            let group = bind(gpu, &gpu.pipelines().layouts().scan, &resources);
-            (group, words.offset(level), gpu.limits().dispatch(length.div_ceil(SCAN_BLOCK)))
-        });
+        let levels =
+            scan.levels.iter().zip(totals).zip((0..).zip(&lengths)).map(|((data, totals), (level, [length]))| {
+                let resources = [words.binding(), data.as_entire_binding(), totals.as_entire_binding()];
+                let group = bind(gpu, &gpu.pipelines().layouts().scan, &resources);
+                (group, words.offset(level), gpu.limits().dispatch(length.div_ceil(SCAN_BLOCK)))
+            });
         Ok(PrefixSums {
             levels: levels.collect(),
             scan_blocks: self.pipeline(Stage::ScanBlocks),

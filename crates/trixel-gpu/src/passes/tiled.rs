@@ -29,7 +29,8 @@ impl Recorder<'_> {
     pub(super) fn tiled(&mut self, slab: &Slab, unit: &Unit<'_>) -> Result<(), GpuError> {
         let (gpu, job) = (self.setting.gpu, self.setting.job);
         // One number is that of no tile. A grid of more can only be a list's, without voxels of its own.
-        let Some(tiles) = u32::try_from(tiles_of(slab, job.grid().dims())).ok().filter(|tiles| *tiles < u32::MAX) else {
+        let Some(tiles) = u32::try_from(tiles_of(slab, job.grid().dims())).ok().filter(|tiles| *tiles < u32::MAX)
+        else {
             return self.triangle_parallel(unit);
         };
         let triangles = unit.chunk.triangles;
@@ -77,7 +78,8 @@ impl Recorder<'_> {
         let paired = bind(gpu, &layouts.pair_tiles, &paired);
         let blocks = length.div_ceil(64);
         let key_bits = u32::BITS - tiles.leading_zeros();
-        let digits: Vec<_> = (0..key_bits).step_by(DIGIT_BITS as usize).map(|shift| [length, blocks, shift, 0, 0]).collect();
+        let digits: Vec<_> =
+            (0..key_bits).step_by(DIGIT_BITS as usize).map(|shift| [length, blocks, shift, 0, 0]).collect();
         let words = WordSets::new(gpu, &digits)?;
         let [from, to] = [[0, 1], [1, 0]].map(|[from, to]: [usize; 2]| {
             let [from, to] = [from, to].map(|i| whole(&buffers.pairs[i]));
