@@ -24,28 +24,31 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn measure(tool: &str, folder: &Path, mode: &str, seconds: f64) -> Result<(), Box<dyn Error>> {
     let load_ms = tools::load(tool, folder)?;
     let case = Case::read(folder)?;
-    let before = peak_bytes();
-    let mut times = vec![];
+    // From here on the peak counts anew.
+    std::fs::write("/proc/self/clear_refs", "5")?;
+    let before = status_bytes("VmRSS:");
+    let (mut times, mut cpu_times) = (vec![], vec![]);
     let start = Instant::now();
     let found = loop {
         let (found, took) = tools::voxelize(tool, &case, mode)?;
-        times.push(took.as_secs_f64() * 1e3);
+        times.push(took.wall_ms);
+        cpu_times.push(took.cpu_ms);
         if times.len() == 11 || start.elapsed().as_secs_f64() > seconds {
             break found;
         }
     };
-    let peak = peak_bytes();
+    let peak = status_bytes("VmHWM:");
     let [missing, extra] = case.compare(mode, &found)?;
     let result = json!({
-        "load_ms": load_ms, "times_ms": times, "before_bytes": before, "peak_bytes": peak, "missing": missing, "extra": extra,
+        "load_ms": load_ms, "times_ms": times, "cpu_ms": cpu_times, "before_bytes": before, "peak_bytes": peak, "missing": missing, "extra": extra,
     });
     println!("{result}");
     Ok(())
 }
 
-/// The most memory that this process has had in use; 0 where the system does not say.
-fn peak_bytes() -> u64 {
+/// A number of bytes that the system keeps of this process; 0 where it does not.
+fn status_bytes(name: &str) -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let line = status.lines().find_map(|line| line.strip_prefix(name));
     line.and_then(|line| line.trim().trim_end_matches(" kB").parse::<u64>().ok()).unwrap_or(0) * 1024
 }
