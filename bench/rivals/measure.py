@@ -110,24 +110,12 @@ def itk(case):
     import itk as itk_module
 
     itk_module.MultiThreaderBase.SetGlobalDefaultNumberOfThreads(THREADS)
-    mesh = itk_module.mesh_from_dict(
-        {
-            "meshType": {
-                "dimension": 3, "pointComponentType": "float32", "pointPixelComponentType": "float64",
-                "pointPixelType": "Scalar", "pointPixelComponents": 1, "cellComponentType": "uint64",
-                "cellPixelComponentType": "float64", "cellPixelType": "Scalar", "cellPixelComponents": 1,
-            },
-            "name": "mesh", "dimension": 3,
-            "numberOfPoints": len(case.vertices), "points": case.vertices.astype(np.float32).ravel(),
-            "numberOfPointPixels": 0, "pointData": np.array([]),
-            "numberOfCells": len(case.triangles),
-            "cells": np.column_stack(
-                [np.full(len(case.triangles), 2), np.full(len(case.triangles), 3), case.triangles]
-            ).astype(np.uint64).ravel(),
-            "cellBufferSize": 5 * len(case.triangles),
-            "numberOfCellPixels": 0, "cellData": np.array([]),
-        }
-    )
+    # Its meshes hold coordinates as floats; the pixel type decides that of the image.
+    mesh = itk_module.Mesh[itk_module.UC, 3].New()
+    mesh.SetPoints(itk_module.vector_container_from_array(case.vertices.astype(np.float32).ravel()))
+    count = len(case.triangles)
+    cells = np.column_stack([np.full(count, 2), np.full(count, 3), case.triangles]).astype(np.uint64).ravel()
+    mesh.SetCellsArray(itk_module.vector_container_from_array(cells))
 
     def voxelize():
         kind = itk_module.TriangleMeshToBinaryImageFilter[type(mesh), itk_module.Image[itk_module.UC, 3]]
@@ -164,17 +152,21 @@ def cudavox(case):
 
     points = case.vertices.astype(np.float32)
     triangles = case.triangles.astype(np.int64)
-    size = np.array(case.dims, dtype=np.int32)
-    low, high = np.zeros(3, np.float32), size.astype(np.float32)
+    # Its solids want a cube; and it grows the box that it is given by a ten-thousandth on all sides.
+    side = max(case.dims)
+    size = np.full(3, side, dtype=np.int32)
+    room = side * 1e-4 / (1 + 2e-4)
+    low, high = np.full(3, room, np.float32), np.full(3, side - room, np.float32)
 
     def voxelize():
-        # The third array, of grey values, is written by CudaVox, a value a triangle.
+        # Grey values are written to the image, one a triangle.
         found = CudaVox.run(
             Triangles=triangles, Tetra=np.zeros((0, 4), np.int64), Greyscale=np.full((len(triangles), 2), 255, np.int64),
             Points=points, Bbox_min=low, Bbox_max=high, gridsize=size, useThrustPath=False, forceCPU=True,
             solid=MODE == "solid", use_tetra=False,
         )
-        return lambda: np.asarray(found).reshape(case.dims) > 0
+        x, y, z = case.dims
+        return lambda: np.asarray(found).reshape(side, side, side)[:x, :y, :z] > 0
 
     return voxelize
 
@@ -197,19 +189,13 @@ def load_pyvista(path):
     return pv.read(path)
 
 
-def load_itk(path):
-    import itk as itk_module
-
-    return itk_module.meshread(path)
-
-
 def load_libigl(path):
     import igl
 
     return igl.readPLY(path) if hasattr(igl, "readPLY") else igl.read_triangle_mesh(path)
 
 
-LOADERS = {"itk": load_itk, "open3d": load_open3d, "trimesh": load_trimesh, "pyvista": load_pyvista, "libigl": load_libigl}
+LOADERS = {"open3d": load_open3d, "trimesh": load_trimesh, "pyvista": load_pyvista, "libigl": load_libigl}
 TOOLS = {"open3d": open3d, "trimesh": trimesh, "pyvista": pyvista, "itk": itk, "libigl": libigl, "cudavox": cudavox}
 
 
