@@ -188,7 +188,7 @@ fn counters(results: &Results, out: &mut String) {
     }
     out.push_str(
         "<h2>Work</h2>\n<p class=\"note\">What the shaders counted themselves; it is the same on every adapter but \
-                  for fragments, which the rasterizer proposes. Lane use is the share of \
+                  for fragments, which the rasterizer proposes, and atomics, which whoever comes late is spared. Lane use is the share of \
                   32 neighbouring invocations with a column to work on while any of them has one.</p>\n",
     );
     let names = [
