@@ -152,10 +152,11 @@ def cudavox(case):
 
     points = case.vertices.astype(np.float32)
     triangles = case.triangles.astype(np.int64)
-    # Its solids want a cube; and it grows the box that it is given by a ten-thousandth on all sides.
+    # Its solids want a cube. It grows the box that it is given by a 10001st of it on all sides, in floats; what is taken off that
+    # keeps walls on the grid's border inside.
     side = max(case.dims)
     size = np.full(3, side, dtype=np.int32)
-    room = side * 1e-4 / (1 + 2e-4)
+    room = side / 10003 - side * 1e-7
     low, high = np.full(3, room, np.float32), np.full(3, side - room, np.float32)
 
     def voxelize():
