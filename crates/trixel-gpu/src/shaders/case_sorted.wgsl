@@ -17,7 +17,8 @@ fn take_sorted(i: u32) {
     if COUNTING {
         count(COUNT_INVOCATIONS, 1u);
     }
-    voxelize_case(corners(sorted[start + i]));
+    painting = sorted[start + i];
+    voxelize_case(corners(painting));
     flush_counters();
 }
 
