@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
+use crate::lists;
 use crate::plot::{Line, plot};
 use crate::published::{CL, CL_HARDWARE, CL_RESOLUTIONS, HCV, HCV_HARDWARE};
 use crate::results::{Cell, Results, SLICE_PER_PASS, SLICED};
-use crate::text::ms;
+use crate::text::{lane_use, ms};
 
 const STYLE: &str = "
 :root { color-scheme: light dark; --line: #8884; --soft: #8881; --best: #00814a; --bad: #c22; }
@@ -42,11 +43,14 @@ pub fn page(results: &Results) -> String {
         escape(&results.mode),
         results.wrong_voxels()
     );
-    out.push_str(
-        "<h2>Times</h2>\n<p class=\"note\">Median of the runs in milliseconds, without upload and download; in \
-                  small type the shortest and the longest. The best of a row is green.</p>\n",
-    );
-    table(results, &mut out);
+    if !results.cells.is_empty() {
+        out.push_str(
+            "<h2>Times</h2>\n<p class=\"note\">Median of the runs in milliseconds, without upload and download; in \
+                      small type the shortest and the longest. The best of a row is green.</p>\n",
+        );
+        table(results, &mut out);
+    }
+    list_methods(results, &mut out);
     figures(results, &mut out);
     counters(results, &mut out);
     if results.columns().iter().any(|column| [SLICED, SLICE_PER_PASS].contains(column)) {
@@ -115,6 +119,26 @@ fn table(results: &Results, out: &mut String) {
     out.push_str(END);
 }
 
+fn list_methods(results: &Results, out: &mut String) {
+    let rows = lists::rows(results);
+    if rows.is_empty() {
+        return;
+    }
+    out.push_str(
+        "<h2>Voxel lists</h2>\n<p class=\"note\">Voxelizing and listing in x-y-z order, medians of the runs; memory is the \
+                  most in use beside the mesh.</p>\n",
+    );
+    head(&lists::HEAD, out);
+    for row in rows {
+        out.push_str("<tr>");
+        for cell in row {
+            let _ = write!(out, "<td>{}</td>", escape(&cell));
+        }
+        out.push_str("</tr>\n");
+    }
+    out.push_str(END);
+}
+
 /// A strategy's line for each mesh.
 fn over_resolution(results: &Results, strategy: &str) -> Vec<Line> {
     let lines = results.meshes().into_iter().map(|mesh| {
@@ -175,10 +199,22 @@ fn counters(results: &Results, out: &mut String) {
     }
     out.push_str(
         "<h2>Work</h2>\n<p class=\"note\">What the shaders counted themselves; it is the same on every adapter but \
-                  for fragments, which the rasterizer proposes.</p>\n",
+                  for fragments, which the rasterizer proposes, and atomics, which whoever comes late is spared. Lane use is the share of \
+                  32 neighbouring invocations with a column to work on while any of them has one.</p>\n",
     );
-    let names =
-        ["mesh", "at", "strategy", "invocations", "fragments", "discarded", "columns", "tests", "written", "atomics"];
+    let names = [
+        "mesh",
+        "at",
+        "strategy",
+        "invocations",
+        "fragments",
+        "discarded",
+        "columns",
+        "tests",
+        "written",
+        "atomics",
+        "lane use",
+    ];
     head(&names, out);
     for (cell, c) in counted {
         let _ =
@@ -188,7 +224,7 @@ fn counters(results: &Results, out: &mut String) {
         {
             let _ = write!(out, "<td>{value}</td>");
         }
-        out.push_str("</tr>\n");
+        let _ = writeln!(out, "<td>{}</td></tr>", lane_use(&c));
     }
     out.push_str(END);
 }

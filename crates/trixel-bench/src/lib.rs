@@ -11,10 +11,11 @@ mod subjects;
 pub mod compare;
 pub mod fills;
 pub mod html;
+pub mod lists;
 pub mod measure;
 pub mod published;
 pub mod results;
 pub mod text;
 
-pub use results::{Adapter, Cell, Machine, Results, Sweep};
+pub use results::{Adapter, Cell, ListCell, Machine, Results, Sweep};
 pub use subjects::{MODELS, SCENES, inputs, load, models_folder};

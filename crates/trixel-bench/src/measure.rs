@@ -7,6 +7,7 @@ use trixel::{Backend, CpuBackend, Grid, GridError, Job, Mesh, Mode, Strategy, Vo
 use trixel_gpu::{Cutoff, Gpu, GpuError, GpuMesh, GpuVolume, Heuristic, Options, Voxelizer};
 
 use crate::cpu_name::cpu_name;
+use crate::lists;
 use crate::results::{Adapter, Cell, Machine, Results, SCHEMA, Sweep};
 
 /// What to measure on every mesh.
@@ -28,6 +29,8 @@ pub struct Plan {
     pub count: bool,
     /// Cutoffs at which to time the hybrid, at the last resolution.
     pub sweep: Vec<f32>,
+    /// Whether to measure the methods of listing voxels instead of the strategies.
+    pub lists: bool,
 }
 
 /// Why nothing was measured.
@@ -83,6 +86,7 @@ impl Results {
             mode: mode.name().to_owned(),
             cells: vec![],
             sweeps: vec![],
+            lists: vec![],
         }
     }
 
@@ -102,6 +106,12 @@ impl Results {
         for &resolution in &plan.resolutions {
             let grid = Grid::fit(&bounds, resolution)?;
             let lattice = LatticeMesh::snap(mesh, &grid)?;
+            if let (true, Some(gpu)) = (plan.lists, gpu) {
+                progress(&format!("{name} at {resolution}: lists"));
+                let job = Job::new(grid, plan.mode);
+                self.lists.extend(lists::measure((name, resolution), &lattice, &job, gpu, plan.runs)?);
+                continue;
+            }
             let bench = Bench { name, resolution, lattice: &lattice, job: Job::new(grid, plan.mode), plan, progress };
             let sweep = if plan.resolutions.last() == Some(&resolution) { plan.sweep.as_slice() } else { &[] };
             bench.run(self, gpu, sweep)?;
@@ -250,7 +260,7 @@ fn time(voxelizer: &mut Voxelizer, mesh: &GpuMesh, volume: &GpuVolume) -> Result
 }
 
 /// Sorts; 0 of none.
-fn median(times: &mut [f64]) -> f64 {
+pub(crate) fn median(times: &mut [f64]) -> f64 {
     times.sort_by(f64::total_cmp);
     times.get(times.len() / 2).copied().unwrap_or(0.0)
 }

@@ -11,7 +11,7 @@ pub(crate) struct Line {
 }
 
 /// Colours that people with colour blindness can tell apart (Okabe and Ito 2008).
-const COLORS: [RGBColor; 7] = [
+const COLORS: [RGBColor; 9] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -19,6 +19,8 @@ const COLORS: [RGBColor; 7] = [
     RGBColor(86, 180, 233),
     RGBColor(230, 159, 0),
     RGBColor(90, 90, 90),
+    RGBColor(0, 0, 0),
+    RGBColor(160, 140, 0),
 ];
 
 const SIZE: (u32, u32) = (720, 420);

@@ -29,6 +29,9 @@ pub struct Results {
     pub cells: Vec<Cell>,
     /// Times over the hybrid's cutoff.
     pub sweeps: Vec<Sweep>,
+    /// The methods of listing voxels, if they were measured.
+    #[serde(default)]
+    pub lists: Vec<ListCell>,
 }
 
 /// The machine.
@@ -88,6 +91,33 @@ pub struct Cell {
     pub wrong_voxels: u64,
 }
 
+/// One mesh, resolution and method of listing its voxels.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ListCell {
+    /// The mesh.
+    pub mesh: String,
+    /// Its triangles.
+    pub triangles: u64,
+    /// Voxels along the grid's longest side.
+    pub resolution: u32,
+    /// The method.
+    pub method: String,
+    /// Runs that were timed.
+    pub runs: usize,
+    /// The median time of voxelizing and listing together, in milliseconds.
+    pub median_ms: f64,
+    /// The shortest.
+    pub min_ms: f64,
+    /// The longest.
+    pub max_ms: f64,
+    /// Voxels in the list.
+    pub voxels: u64,
+    /// The most bytes in use at any time beside the mesh: bits where there are any, the list, and what making it takes.
+    pub memory_bytes: u64,
+    /// Entries that differ from the CPU's.
+    pub wrong_entries: u64,
+}
+
 /// The hybrid's time over its cutoff.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Sweep {
@@ -133,10 +163,11 @@ impl Results {
         time(SLICED).zip(time(SLICE_PER_PASS)).map(|(sliced, per_pass)| per_pass / sliced)
     }
 
-    /// Voxels that differ from the CPU's, over all cells.
+    /// Voxels that differ from the CPU's, over all cells and lists.
     #[must_use]
     pub fn wrong_voxels(&self) -> u64 {
-        self.cells.iter().map(|cell| cell.wrong_voxels).sum()
+        let lists: u64 = self.lists.iter().map(|cell| cell.wrong_entries).sum();
+        self.cells.iter().map(|cell| cell.wrong_voxels).sum::<u64>() + lists
     }
 
     /// The adapter in words, and that it is no GPU where it is none.

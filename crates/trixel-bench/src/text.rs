@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use trixel_gpu::Counters;
+
 use crate::published::{CL, CL_HARDWARE, CL_RESOLUTIONS, HCV, HCV_HARDWARE};
 use crate::results::{self, Results};
 
@@ -60,14 +62,15 @@ pub fn table(results: &Results) -> String {
             rows.push(row);
         }
     }
-    let runs = results.cells.iter().map(|cell| cell.runs).max().unwrap_or(0);
+    let lists = results.lists.iter().map(|cell| cell.runs);
+    let runs = results.cells.iter().map(|cell| cell.runs).chain(lists).max().unwrap_or(0);
+    let table = if results.cells.is_empty() { String::new() } else { format!("\n{}", aligned(&rows)) };
     format!(
-        "{}\n{}, {} threads; mode {}; medians of {runs} runs in ms, without upload and download\n\n{}",
+        "{}\n{}, {} threads; mode {}; medians of {runs} runs in ms, without upload and download\n{table}",
         results.adapter_line(),
         results.machine.cpu,
         results.machine.threads,
         results.mode,
-        aligned(&rows)
     )
 }
 
@@ -123,6 +126,11 @@ pub fn published_cl() -> String {
     format!("As published, not measured here: {CL_HARDWARE}\n\n{}", aligned(&rows))
 }
 
+/// The share of lanes at work, as a percentage; nothing where all work was the rasterizer's.
+pub(crate) fn lane_use(counters: &Counters) -> String {
+    counters.lane_use().map_or(String::new(), |share| format!("{:.0} %", 100.0 * share))
+}
+
 /// What the shaders counted.
 #[must_use]
 pub fn counters(results: &Results) -> Option<String> {
@@ -138,6 +146,7 @@ pub fn counters(results: &Results) -> Option<String> {
         "tests",
         "written",
         "atomics",
+        "lane use",
     ];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for cell in &results.cells {
@@ -156,6 +165,7 @@ pub fn counters(results: &Results) -> Option<String> {
             counted.voxel_tests.to_string(),
             counted.voxels_written.to_string(),
             counted.atomics.to_string(),
+            lane_use(&counted),
         ]);
     }
     (rows.len() > 1).then(|| aligned(&rows))

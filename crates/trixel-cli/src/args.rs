@@ -467,6 +467,7 @@ Examples:
   trixel bench --table cl torus.obj horse.ply dragon.ply
   trixel bench --table fills bunny.ply -r 64,128,256
   trixel bench --figure 3.13 --figure 3.14 scene:room --html sweep.html
+  trixel bench --lists bunny.ply scene:room
   trixel bench --compare results.json";
 
 #[derive(Debug, Args)]
@@ -487,6 +488,10 @@ pub(crate) struct BenchArgs {
     /// Measure what this figure of Rauwendaal 2012 needs; 3.13 and 3.14 sweep the hybrid's cutoff. --html shows it.
     #[arg(long = "figure", value_enum, value_name = "NUMBER")]
     pub(crate) figures: Vec<FigureArg>,
+
+    /// Compare the methods of listing voxels on the GPU instead of the strategies: time, memory, wrong entries.
+    #[arg(long, conflicts_with_all = ["table", "figures", "strategy", "cutoff", "counters"])]
+    pub(crate) lists: bool,
 
     /// Voxels along the longest side of the grid.
     #[arg(short, long = "resolution", value_delimiter = ',', value_name = "N,...", default_value = "128,256,512",
@@ -693,6 +698,10 @@ pub(crate) enum StrategyArg {
     Sliced,
     /// GPU, mode sliced: the whole mesh once for each slice.
     SlicePerPass,
+    /// GPU: triangles sorted by the axes their boxes extend along, code for each case (Schwarz and Seidel 2010).
+    CaseSorted,
+    /// GPU: triangles binned to tiles and sorted, one workgroup a tile (VoxelPipe, 2011).
+    Tiled,
 }
 
 impl From<StrategyArg> for Strategy {
@@ -707,6 +716,8 @@ impl From<StrategyArg> for Strategy {
             StrategyArg::Balanced => Self::Balanced,
             StrategyArg::Sliced => Self::Sliced,
             StrategyArg::SlicePerPass => Self::SlicePerPass,
+            StrategyArg::CaseSorted => Self::CaseSorted,
+            StrategyArg::Tiled => Self::Tiled,
         }
     }
 }

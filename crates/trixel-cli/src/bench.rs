@@ -10,7 +10,7 @@ use trixel::{Mode, Strategy};
 use trixel_bench::fills::Fills;
 use trixel_bench::measure::Plan;
 use trixel_bench::results::SCHEMA;
-use trixel_bench::{Results, compare, html, text};
+use trixel_bench::{Results, compare, html, lists, text};
 use trixel_gpu::{AdapterChoice, Gpu, GpuError, STRATEGIES, strategies_of};
 use trixel_io::atomic_file::{AtomicFile, Staged};
 
@@ -40,6 +40,9 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
     }
     let reporter = Reporter::new(false);
     let gpu = open(args, &reporter)?;
+    if args.lists && gpu.is_none() {
+        usage("--lists compares what GPUs do, and there is none here; a software one will do");
+    }
     let plan = Plan {
         resolutions: args.resolutions.clone(),
         mode,
@@ -49,6 +52,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
         cutoff: args.cutoff,
         count: args.counters,
         sweep: sweep(&args.figures),
+        lists: args.lists,
     };
 
     let mut results = Results::new(gpu.as_ref(), plan.mode);
@@ -70,6 +74,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
     reporter.finish();
 
     let mut parts = vec![text::table(&results)];
+    parts.extend(lists::text(&results));
     parts.extend(text::counters(&results));
     parts.extend(text::sweeps(&results));
     parts.extend(args.table.map(|table| match table {

@@ -329,7 +329,9 @@ fn help_and_completions_are_there() {
 fn a_gpu_gives_the_same_bytes_and_reports_itself() {
     let bench = Bench::new();
     bench.ok("voxelize scene:room --resolution 60 --backend cpu -o cpu.npz");
-    for strategy in ["triangle-parallel", "fragment-parallel", "hybrid", "hybrid-two-pass", "balanced"] {
+    for strategy in
+        ["triangle-parallel", "fragment-parallel", "hybrid", "hybrid-two-pass", "balanced", "case-sorted", "tiled"]
+    {
         let arguments = format!("--adapter llvmpipe --strategy {strategy} --counters --cutoff 30");
         bench.ok(&format!("voxelize scene:room --resolution 60 {arguments} -o gpu.npz --report r.json"));
         assert_eq!(std::fs::read(bench.path("cpu.npz")).unwrap(), std::fs::read(bench.path("gpu.npz")).unwrap());
@@ -664,13 +666,22 @@ fn bench_measures_every_strategy_and_counts_wrong_voxels() {
     let bench = Bench::new();
     let arguments = "bench scene:room:8 scene:triangle -r 12,20 --adapter llvmpipe --repeat 2 --cutoff 9";
     let ran = bench.ok(&format!("{arguments} --table hcv --figure 3.14 --counters --json r.json --html r.html"));
-    for said in ["SOFTWARE adapter", "llvmpipe", "mode thin", "GeForce GTX 480", "hybrid-two-pass", "discarded"] {
+    for said in [
+        "SOFTWARE adapter",
+        "llvmpipe",
+        "mode thin",
+        "GeForce GTX 480",
+        "hybrid-two-pass",
+        "discarded",
+        "lane use",
+        "tiled",
+    ] {
         assert!(ran.stdout.contains(said), "no {said} in {}", ran.stdout);
     }
     let results: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("r.json")).unwrap()).unwrap();
     let cells = results["cells"].as_array().unwrap();
-    // The CPU's strategy and five of the GPU's, on two meshes at two resolutions.
-    assert_eq!(cells.len(), 6 * 2 * 2);
+    // The CPU's strategy and seven of the GPU's, on two meshes at two resolutions.
+    assert_eq!(cells.len(), 8 * 2 * 2);
     assert!(cells.iter().all(|cell| cell["wrong_voxels"] == 0 && cell["voxels"].as_u64() > Some(0)));
     assert!(cells.iter().all(|cell| cell["min_ms"].as_f64() <= cell["median_ms"].as_f64()));
     assert_eq!(results["sweeps"].as_array().unwrap().len(), 2);
@@ -680,6 +691,17 @@ fn bench_measures_every_strategy_and_counts_wrong_voxels() {
 
     let compared = bench.ok(&format!("{arguments} --mode thin --compare r.json"));
     assert!(compared.stdout.contains("room at 20, gpu hybrid: "), "{}", compared.stdout);
+    let lists =
+        bench.ok("bench --lists scene:room:8 -r 20 --adapter llvmpipe --repeat 1 --json l.json --html l.html").stdout;
+    for said in ["scan", "histopyramid", "atomic", "fragment-list", "memory"] {
+        assert!(lists.contains(said), "no {said} in {lists}");
+    }
+    let results: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("l.json")).unwrap()).unwrap();
+    let cells = results["lists"].as_array().unwrap();
+    assert_eq!(cells.len(), 4);
+    assert!(cells.iter().all(|cell| cell["wrong_entries"] == 0 && cell["voxels"] == cells[0]["voxels"]));
+    assert!(std::fs::read_to_string(bench.path("l.html")).unwrap().contains("<h2>Voxel lists</h2>"));
+    bench.fails(2, "bench --lists --counters scene:cube", &["--lists", "--counters"]);
     bench.ok("bench scene:cube -r 8 --backend cpu --repeat 1");
     bench.fails(1, "bench scene:cube -r 8 --compare r.html", &["r.html", "bench --json"]);
     bench.fails(1, "bench --models nowhere", &["models.json", "Stanford Bunny"]);

@@ -164,8 +164,8 @@ pub enum GpuError {
          `GpuMesh::upload`, which gives these to the CPU, or split them"
     )]
     TrianglesTooLarge(u64),
-    /// More pairs of triangle and column than 32 bits count.
-    #[error("`balanced` would need more than 2^32 invocations for this mesh and grid; use `hybrid`")]
+    /// More pairs of triangle and column, or of triangle and tile, than 32 bits count.
+    #[error("`balanced` and `tiled` would need more than 2^32 invocations for this mesh and grid; use `hybrid`")]
     TooManyColumns,
     /// A strategy whose fragments claim no voxels.
     #[error(
@@ -176,6 +176,17 @@ pub enum GpuError {
     /// More copies of triangles than 32 bits number the vertices of.
     #[error("`sliced` would draw more than 2^32 vertices for this mesh, grid and overlap; use `hybrid`")]
     TooManySlices,
+    /// Triangles of a caller's own buffers meet more tiles than `tiled` made room for.
+    #[error(
+        "the triangles meet {needed} tiles, and `tiled` has room for {room} of a mesh whose sizes it does not know; upload it \
+         with `GpuMesh::upload`, or use `hybrid`"
+    )]
+    TooManyTiles {
+        /// Pairs of triangle and tile.
+        needed: u32,
+        /// Those there was room for.
+        room: u32,
+    },
     /// The part of the mesh that the CPU does failed.
     #[error(transparent)]
     Cpu(#[from] trixel::Error),

@@ -30,6 +30,7 @@ mod shader;
 mod sparse;
 mod texture;
 mod tier;
+mod tiles;
 mod timer;
 mod tune;
 mod volume;

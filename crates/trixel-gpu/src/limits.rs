@@ -10,6 +10,16 @@ pub const MAX_EXTENT: i64 = 1 << 29;
 /// Pairs of triangle and column that `balanced` can number: whole rows of workgroups below 2^32.
 pub(crate) const MAX_PAIRS: u32 = 65_535 * 64 * 1024;
 
+/// Voxels along each axis of a tile of `tiled`, as logarithms: a column of it is one word.
+pub(crate) const TILE_SHIFT: [u32; 3] = [4, 4, 5];
+
+/// Pairs of triangle and tile that `tiled` sorts at a time: 8 bytes each, twice.
+pub(crate) const TILE_ROUND: u32 = 1 << 22;
+
+/// Pairs that one workgroup of `tiled` takes: 64 an invocation, whose at most 512 columns keep its loops short of
+/// [`SAFE_ITERATIONS`].
+pub(crate) const TILE_SHARE: u32 = 64 * WORKGROUP;
+
 /// Invocations of a workgroup.
 pub(crate) const WORKGROUP: u32 = 64;
 

@@ -7,6 +7,7 @@ use trixel::lattice::{LatticeMesh, LatticePositions};
 use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::limits::MAX_EXTENT;
+use crate::tiles::TileCounts;
 
 /// A mesh in buffers of a [`Gpu`].
 #[derive(Debug)]
@@ -26,6 +27,8 @@ pub(crate) struct Chunk {
     /// Three u32 a triangle.
     pub(crate) indices: wgpu::Buffer,
     pub(crate) triangles: u32,
+    /// How many tiles the triangles meet, where known.
+    pub(crate) tiles: Option<TileCounts>,
 }
 
 /// Few triangles of many: the mesh's other vertices are not kept for them.
@@ -122,7 +125,7 @@ impl GpuMesh {
     /// 8192 voxels or longer along an axis; that is found out when the result is read.
     #[must_use]
     pub fn from_buffers(positions: wgpu::Buffer, indices: wgpu::Buffer, triangles: u32) -> Self {
-        let chunks = if triangles == 0 { vec![] } else { vec![Chunk { positions, indices, triangles }] };
+        let chunks = if triangles == 0 { vec![] } else { vec![Chunk { positions, indices, triangles, tiles: None }] };
         Self { chunks, leftover: None, most_columns: None }
     }
 
@@ -150,6 +153,7 @@ impl Chunk {
             )?,
             indices: gpu.buffer_with("trixel indices", bytemuck::cast_slice(indices), wgpu::BufferUsages::STORAGE)?,
             triangles,
+            tiles: Some(TileCounts::of(positions, indices)),
         })
     }
 }

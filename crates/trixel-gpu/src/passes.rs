@@ -1,5 +1,9 @@
 //! The passes of each strategy, recorded into a command encoder.
 
+mod case_sorted;
+mod sums;
+mod tiled;
+
 use trixel::{Job, Mode, Strategy, Volume};
 
 use crate::counters;
@@ -7,7 +11,7 @@ use crate::cutoff::{Cutoff, Dilation};
 use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::layout::{Layout, Part, Unit};
-use crate::limits::{SCAN_BLOCK, WORKGROUP};
+use crate::limits::WORKGROUP;
 use crate::mesh::GpuMesh;
 use crate::pipelines::bind;
 use crate::scratch::{List, Lists, ScanBuffers, Scratch, Status};
@@ -63,6 +67,8 @@ pub(crate) fn record(
                 (Strategy::Balanced, _) => recorder.balanced(unit)?,
                 (Strategy::Sliced, _) => recorder.sliced(unit)?,
                 (Strategy::SlicePerPass, _) => recorder.slice_per_pass(unit)?,
+                (Strategy::CaseSorted, _) => recorder.case_sorted(unit)?,
+                (Strategy::Tiled, _) => recorder.tiled(part.slab, unit)?,
                 _ => recorder.triangle_parallel(unit)?,
             }
         }
@@ -331,48 +337,17 @@ impl<'a> Recorder<'a> {
         let columns = scan.counted();
         let triangles = unit.chunk.triangles;
 
-        let stride = gpu.limits().parameter_stride;
-        let lengths: Vec<u32> = std::iter::successors(Some(triangles), |length| Some(length.div_ceil(SCAN_BLOCK)))
-            .take(scan.levels.len())
-            .collect();
-        let mut bytes = vec![0u8; lengths.len() * stride as usize];
-        for (slot, length) in bytes.chunks_exact_mut(stride as usize).zip(&lengths) {
-            slot[..4].copy_from_slice(&length.to_le_bytes());
-        }
-        let length_buffer = gpu.buffer_with("trixel scan lengths", &bytes, wgpu::BufferUsages::UNIFORM)?;
-        let totals = scan.levels.iter().skip(1).chain([&scan.total]);
-        let blocks: Vec<_> = scan
-            .levels
-            .iter()
-            .zip(totals)
-            .map(|(data, totals)| {
-                let length = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                    buffer: &length_buffer,
-                    offset: 0,
-                    size: wgpu::BufferSize::new(4),
-                });
-                bind(gpu, &layouts.scan, &[length, data.as_entire_binding(), totals.as_entire_binding()])
-            })
-            .zip((0u32..).map(|level| level * stride))
-            .zip(lengths.iter().map(|length| [length.div_ceil(SCAN_BLOCK), 1]))
-            .collect();
+        let sums = self.prefix_sums(&scan, triangles)?;
         let counted = bind(gpu, &layouts.columns, &[columns.as_entire_binding()]);
         let arguments = self.arguments_group(&scan.total, &scan.arguments);
 
         let count = self.pipeline(count);
-        let scan_blocks = self.pipeline(Stage::ScanBlocks);
-        let add_totals = self.pipeline(Stage::AddTotals);
         let write_arguments = self.pipeline(Stage::Arguments { vertices });
         let groups = self.groups(triangles);
 
         let mut pass = self.pass("count and scan");
         run(&mut pass, &count, &unit.bind_group, Some(unit.parameters), Some(&counted), groups);
-        for ((group, offset), groups) in &blocks {
-            run(&mut pass, &scan_blocks, group, Some(*offset), None, *groups);
-        }
-        for ((group, offset), groups) in blocks.iter().rev().skip(1) {
-            run(&mut pass, &add_totals, group, Some(*offset), None, *groups);
-        }
+        sums.record(&mut pass);
         run(&mut pass, &write_arguments, &arguments, None, None, [1, 1]);
         drop(pass);
         let total = self.status.total_offset(unit.index);
@@ -449,8 +424,20 @@ fn run_indirect(
     group_1: &wgpu::BindGroup,
     arguments: &wgpu::Buffer,
 ) {
+    run_indirect_at(pass, pipeline, group_0, parameters, group_1, (arguments, DISPATCH_OFFSET));
+}
+
+/// The same with the arguments anywhere in a buffer.
+fn run_indirect_at(
+    pass: &mut wgpu::ComputePass<'_>,
+    pipeline: &wgpu::ComputePipeline,
+    group_0: &wgpu::BindGroup,
+    parameters: u32,
+    group_1: &wgpu::BindGroup,
+    (arguments, offset): (&wgpu::Buffer, u64),
+) {
     pass.set_pipeline(pipeline);
     pass.set_bind_group(0, group_0, &[parameters]);
     pass.set_bind_group(1, group_1, &[]);
-    pass.dispatch_workgroups_indirect(arguments, DISPATCH_OFFSET);
+    pass.dispatch_workgroups_indirect(arguments, offset);
 }

@@ -54,6 +54,12 @@ pub(crate) struct Layouts {
     pub(crate) expand: wgpu::BindGroupLayout,
     pub(crate) scan: wgpu::BindGroupLayout,
     pub(crate) arguments: wgpu::BindGroupLayout,
+    /// Numbers and their sum into places or sizes.
+    pub(crate) cases: wgpu::BindGroupLayout,
+    pub(crate) case_sorted: wgpu::BindGroupLayout,
+    pub(crate) pair_tiles: wgpu::BindGroupLayout,
+    pub(crate) find_tiles: wgpu::BindGroupLayout,
+    pub(crate) sort: wgpu::BindGroupLayout,
     /// Group 2 of stages that append voxels to a list.
     pub(crate) append: wgpu::BindGroupLayout,
 }
@@ -78,22 +84,39 @@ impl Layouts {
             expand: layout(device, &[Slot::Parameters, read, write]),
             scan: layout(device, &[Slot::Parameters, write, write]),
             arguments: layout(device, &[read, write]),
+            cases: layout(device, &[read, read, write]),
+            case_sorted: layout(device, &[read, read, read]),
+            pair_tiles: layout(device, &[read, read, read, write]),
+            find_tiles: layout(device, &[read, read, write]),
+            sort: layout(device, &[Slot::Parameters, read, write, write]),
             append: layout(device, &[Slot::Write(writers)]),
         }
     }
 
     fn of(&self, stage: Stage, sink: Sink) -> Vec<Option<&wgpu::BindGroupLayout>> {
         let second = match stage {
-            Stage::TriangleParallel { .. } => Some(&self.list_write),
-            Stage::TriangleList { .. } | Stage::Balanced => Some(&self.list_read),
+            Stage::TriangleParallel { .. } | Stage::ClassifyCases => Some(&self.list_write),
+            Stage::TriangleList { .. } | Stage::Balanced | Stage::Tiled => Some(&self.list_read),
             Stage::Classify { .. } => Some(&self.classify),
-            Stage::CountColumns | Stage::CountSlices => Some(&self.columns),
-            Stage::Fill | Stage::Expand | Stage::ScanBlocks | Stage::AddTotals | Stage::Arguments { .. } => None,
+            Stage::CountColumns | Stage::CountSlices | Stage::CountTiles => Some(&self.columns),
+            Stage::SortCases | Stage::CaseSizes => Some(&self.cases),
+            Stage::CaseSorted(_) => Some(&self.case_sorted),
+            Stage::PairTiles => Some(&self.pair_tiles),
+            Stage::Fill
+            | Stage::Expand
+            | Stage::ScanBlocks
+            | Stage::AddTotals
+            | Stage::Arguments { .. }
+            | Stage::FindTiles
+            | Stage::CountDigits
+            | Stage::MoveEntries => None,
         };
         let first = match stage {
             Stage::Expand => &self.expand,
             Stage::ScanBlocks | Stage::AddTotals => &self.scan,
             Stage::Arguments { .. } => &self.arguments,
+            Stage::FindTiles => &self.find_tiles,
+            Stage::CountDigits | Stage::MoveEntries => &self.sort,
             _ => &self.common,
         };
         let third = (sink != Sink::Bits && stage.writes_voxels()).then_some(&self.append);

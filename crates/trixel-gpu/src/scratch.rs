@@ -3,7 +3,7 @@
 use crate::counters;
 use crate::error::GpuError;
 use crate::gpu::Gpu;
-use crate::limits::SCAN_BLOCK;
+use crate::limits::{MAX_PAIRS, SCAN_BLOCK, TILE_SHARE, WORKGROUP};
 use crate::pipelines::TARGET_FORMAT;
 
 /// What a [`crate::Voxelizer`] keeps. Handles of buffers are cheap to clone, and a recording that holds one keeps it alive
@@ -18,6 +18,8 @@ pub(crate) struct Scratch {
     status: Status,
     lists: Option<Lists>,
     scan: Option<ScanBuffers>,
+    cases: Option<CaseBuffers>,
+    tiles: Option<TileBuffers>,
     target: Option<(u32, wgpu::TextureView)>,
 }
 
@@ -28,13 +30,15 @@ pub(crate) struct Status {
     /// How many totals lie between the counters and the number.
     units: u64,
     pub(crate) run: u32,
+    /// Totals above this are of pairs that were left out.
+    pub(crate) room: u32,
 }
 
 impl Status {
     fn new(gpu: &Gpu, units: u64, run: u32) -> Result<Self, GpuError> {
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
         let bytes = counters::BYTES + 4 * units + 4;
-        Ok(Self { buffer: gpu.buffer("trixel status", bytes, usage)?, units, run })
+        Ok(Self { buffer: gpu.buffer("trixel status", bytes, usage)?, units, run, room: MAX_PAIRS })
     }
 
     pub(crate) fn bytes(&self) -> u64 {
@@ -72,6 +76,33 @@ pub(crate) struct ScanBuffers {
     /// The sum of all.
     pub(crate) total: wgpu::Buffer,
     pub(crate) arguments: wgpu::Buffer,
+}
+
+/// Triangles by the case of their boxes.
+#[derive(Clone, Debug)]
+pub(crate) struct CaseBuffers {
+    /// One word a triangle, both.
+    pub(crate) cases: wgpu::Buffer,
+    pub(crate) sorted: wgpu::Buffer,
+    /// Of the four cases' dispatches, three words each.
+    pub(crate) arguments: wgpu::Buffer,
+}
+
+/// Pairs of tile and triangle.
+#[derive(Clone, Debug)]
+pub(crate) struct TileBuffers {
+    /// Two words a pair, before and after each pass of the sort.
+    pub(crate) pairs: [wgpu::Buffer; 2],
+    /// Of the digits of each 64 pairs.
+    pub(crate) digits: ScanBuffers,
+    /// `Shares` of `find_tiles.wgsl`.
+    pub(crate) shares: wgpu::Buffer,
+    pub(crate) arguments: wgpu::Buffer,
+}
+
+/// Counts that the sort of so many pairs sums up.
+pub(crate) fn digit_counts(pairs: u32) -> u32 {
+    pairs.div_ceil(WORKGROUP) * 16
 }
 
 /// Whether a buffer of one word an element has room for so many.
@@ -123,6 +154,31 @@ impl ScanBuffers {
     }
 }
 
+impl CaseBuffers {
+    fn new(gpu: &Gpu, triangles: u32) -> Result<Self, GpuError> {
+        let storage = wgpu::BufferUsages::STORAGE;
+        let list = |label| gpu.buffer(label, u64::from(triangles) * 4, storage);
+        Ok(Self {
+            cases: list("trixel cases")?,
+            sorted: list("trixel triangles by case")?,
+            arguments: gpu.buffer("trixel arguments", 48, storage | wgpu::BufferUsages::INDIRECT)?,
+        })
+    }
+}
+
+impl TileBuffers {
+    fn new(gpu: &Gpu, pairs: u32, shares: u32) -> Result<Self, GpuError> {
+        let storage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        let list = || gpu.buffer("trixel pairs of tile and triangle", u64::from(pairs) * 8, storage);
+        Ok(Self {
+            pairs: [list()?, list()?],
+            digits: ScanBuffers::new(gpu, digit_counts(pairs))?,
+            shares: gpu.buffer("trixel shares of tiles", 8 + 4 * u64::from(shares), storage)?,
+            arguments: arguments(gpu)?,
+        })
+    }
+}
+
 impl Scratch {
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         let counters = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
@@ -137,6 +193,8 @@ impl Scratch {
             status: Status::new(gpu, 0, 0)?,
             lists: None,
             scan: None,
+            cases: None,
+            tiles: None,
             target: None,
         })
     }
@@ -153,7 +211,32 @@ impl Scratch {
             self.status = Status::new(gpu, units, run)?;
         }
         self.status.run = run;
+        self.status.room = MAX_PAIRS;
         Ok(self.status.clone())
+    }
+
+    /// Says that this run has room for so many pairs a unit.
+    pub(crate) fn limit_pairs(&mut self, room: u32) {
+        self.status.room = self.status.room.min(room);
+    }
+
+    /// Buffers for the cases of so many triangles.
+    pub(crate) fn cases(&mut self, gpu: &Gpu, triangles: u32) -> Result<CaseBuffers, GpuError> {
+        match &self.cases {
+            Some(cases) if holds(&cases.cases, triangles) => Ok(cases.clone()),
+            _ => Ok(self.cases.insert(CaseBuffers::new(gpu, triangles)?).clone()),
+        }
+    }
+
+    /// Buffers for so many pairs of a triangle and one of so many tiles.
+    pub(crate) fn tiles(&mut self, gpu: &Gpu, pairs: u32, tiles: u32) -> Result<TileBuffers, GpuError> {
+        let shares = pairs.min(tiles.saturating_add(pairs.div_ceil(TILE_SHARE)));
+        match &self.tiles {
+            Some(kept) if holds(&kept.pairs[0], 2 * pairs) && kept.shares.size() >= 8 + 4 * u64::from(shares) => {
+                Ok(kept.clone())
+            }
+            _ => Ok(self.tiles.insert(TileBuffers::new(gpu, pairs, shares)?).clone()),
+        }
     }
 
     /// Lists with room for so many triangles each.

@@ -3,7 +3,7 @@
 use trixel::Mode;
 
 use crate::cutoff::{Dilation, Heuristic};
-use crate::limits::{MAX_EXTENT, MAX_PAIRS};
+use crate::limits::{MAX_EXTENT, MAX_PAIRS, TILE_SHARE, TILE_SHIFT};
 use crate::tier::Tier;
 
 macro_rules! shader {
@@ -37,6 +37,61 @@ pub(crate) enum Stage {
     AddTotals,
     /// A count turned into a draw's and a dispatch's arguments.
     Arguments { vertices: u32 },
+    /// The case of each triangle's box, and how many a workgroup has of each.
+    ClassifyCases,
+    /// Triangles to their places by case.
+    SortCases,
+    /// The cases' sizes as the arguments of dispatches.
+    CaseSizes,
+    /// Triangles of a case, one invocation each.
+    CaseSorted(BoxCase),
+    /// The number of tiles that each triangle's box meets.
+    CountTiles,
+    /// One invocation a pair of triangle and tile.
+    PairTiles,
+    /// How many pairs have each digit.
+    CountDigits,
+    /// Pairs to their places by a digit.
+    MoveEntries,
+    /// Where in the sorted pairs each workgroup's share begins.
+    FindTiles,
+    /// One workgroup a share of a tile.
+    Tiled,
+}
+
+/// What a triangle's box of voxels extends along: `classify_cases.wgsl`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum BoxCase {
+    /// One axis, or none.
+    Line,
+    /// Two.
+    Flat,
+    /// Three.
+    Deep,
+    /// Whatever is too much for one invocation.
+    Long,
+}
+
+impl BoxCase {
+    pub(crate) const ALL: [Self; 4] = [Self::Line, Self::Flat, Self::Deep, Self::Long];
+
+    pub(crate) fn code(self) -> u32 {
+        match self {
+            Self::Line => 0,
+            Self::Flat => 1,
+            Self::Deep => 2,
+            Self::Long => 3,
+        }
+    }
+
+    /// The code for it; only conservative voxels know less than columns need.
+    fn files(self, mode: Mode) -> &'static [&'static str] {
+        match (self, mode) {
+            (Self::Line, Mode::Conservative) => shader!("case_line"),
+            (Self::Flat, Mode::Conservative) => shader!("case_flat"),
+            _ => shader!("case_columns"),
+        }
+    }
 }
 
 impl Stage {
@@ -54,34 +109,62 @@ impl Stage {
             Self::ScanBlocks => "scan_blocks",
             Self::AddTotals => "add_totals",
             Self::Arguments { .. } => "write_arguments",
+            Self::ClassifyCases => "classify_cases",
+            Self::SortCases => "sort_cases",
+            Self::CaseSizes => "case_sizes",
+            Self::CaseSorted(_) => "case_sorted",
+            Self::CountTiles => "count_tiles",
+            Self::PairTiles => "pair_tiles",
+            Self::CountDigits => "count_digits",
+            Self::MoveEntries => "move_entries",
+            Self::FindTiles => "find_tiles",
+            Self::Tiled => "tiled",
         }
     }
 
     /// Whether voxels are written, and so may be appended to a list.
     pub(crate) fn writes_voxels(self) -> bool {
         match self {
-            Self::TriangleParallel { .. } | Self::TriangleList { .. } | Self::Balanced | Self::Fill => true,
+            Self::TriangleParallel { .. }
+            | Self::TriangleList { .. }
+            | Self::Balanced
+            | Self::Fill
+            | Self::CaseSorted(_)
+            | Self::Tiled => true,
             Self::Classify { .. }
             | Self::CountColumns
             | Self::CountSlices
             | Self::Expand
             | Self::ScanBlocks
             | Self::AddTotals
-            | Self::Arguments { .. } => false,
+            | Self::Arguments { .. }
+            | Self::ClassifyCases
+            | Self::SortCases
+            | Self::CaseSizes
+            | Self::CountTiles
+            | Self::PairTiles
+            | Self::CountDigits
+            | Self::MoveEntries
+            | Self::FindTiles => false,
         }
     }
 
     fn files(self) -> &'static [&'static str] {
         match self {
             Self::TriangleParallel { .. } => shader!(
-                "wide" "common" "triangle" "size" "look" "column" "columns" "voxels" "counters" "triangle_parallel"
+                "wide" "common" "triangle" "size" "look" "column" "columns" "voxels" "runs" "direct" "counters" "lanes"
+                "triangle_parallel"
             ),
             Self::TriangleList { .. } => {
-                shader!("wide" "common" "triangle" "column" "columns" "voxels" "counters" "triangle_list")
+                shader!(
+                    "wide" "common" "triangle" "column" "columns" "voxels" "runs" "direct" "counters" "lanes" "triangle_list"
+                )
             }
             Self::Classify { .. } => shader!("wide" "common" "triangle" "size" "look" "counters" "classify"),
             Self::CountColumns => shader!("wide" "common" "triangle" "look" "counters" "count_columns"),
-            Self::Balanced => shader!("wide" "common" "triangle" "column" "voxels" "counters" "pair" "balanced"),
+            Self::Balanced => shader!(
+                "wide" "common" "triangle" "column" "voxels" "runs" "direct" "counters" "lanes" "pairs" "balanced"
+            ),
             Self::CountSlices => {
                 shader!("wide" "common" "triangle" "look" "counters" "slices_of" "count_slices")
             }
@@ -89,6 +172,23 @@ impl Stage {
             Self::Expand => shader!("expand"),
             Self::ScanBlocks | Self::AddTotals => shader!("scan"),
             Self::Arguments { .. } => shader!("arguments"),
+            Self::ClassifyCases => shader!("wide" "common" "triangle" "look" "counters" "classify_cases"),
+            Self::SortCases => shader!("common" "sort_cases"),
+            Self::CaseSizes => shader!("common" "case_sizes"),
+            Self::CaseSorted(_) => shader!(
+                "wide" "common" "triangle" "column" "columns" "voxels" "runs" "direct" "counters" "lanes" "case_sorted"
+            ),
+            Self::CountTiles => {
+                shader!("wide" "common" "triangle" "look" "counters" "tiles" "triangle_tiles" "count_tiles")
+            }
+            Self::PairTiles => {
+                shader!("wide" "common" "triangle" "counters" "tiles" "triangle_tiles" "pairs" "pair_tiles")
+            }
+            Self::CountDigits | Self::MoveEntries => shader!("numbering" "tile_key" "radix_sort"),
+            Self::FindTiles => shader!("numbering" "find_tiles"),
+            Self::Tiled => shader!(
+                "wide" "common" "triangle" "column" "voxels" "runs" "tiles" "tile_memory" "counters" "lanes" "tiled"
+            ),
         }
     }
 }
@@ -125,14 +225,16 @@ impl Raster {
 
     fn files(self) -> &'static [&'static str] {
         match self.drawn {
-            Drawn::All | Drawn::Listed => {
-                shader!("wide" "common" "triangle" "column" "voxels" "counters" "dilate" "fragment_parallel")
-            }
+            Drawn::All | Drawn::Listed => shader!(
+                "wide" "common" "triangle" "column" "voxels" "runs" "direct" "counters" "dilate" "fragment_parallel"
+            ),
             Drawn::Slices => shader!(
-                "wide" "common" "triangle" "column" "voxels" "counters" "dilate" "slices_of" "slice" "pair" "sliced"
+                "wide" "common" "triangle" "column" "voxels" "runs" "direct" "counters" "dilate" "slices_of" "slice" "pairs"
+                "sliced"
             ),
             Drawn::Slice => shader!(
-                "wide" "common" "triangle" "column" "voxels" "counters" "dilate" "slices_of" "slice" "slice_per_pass"
+                "wide" "common" "triangle" "column" "voxels" "runs" "direct" "counters" "dilate" "slices_of" "slice"
+                "slice_per_pass"
             ),
         }
     }
@@ -207,9 +309,26 @@ impl Variant {
 
 /// The WGSL of a compute stage.
 pub(crate) fn source(stage: Stage, variant: Variant, tier: Tier, max_groups: u32) -> String {
-    let small = matches!(stage, Stage::TriangleParallel { .. } | Stage::TriangleList { small: true });
-    let mut constants = format!("const SMALL: bool = {small};\n");
+    let small = match stage {
+        Stage::TriangleParallel { .. } | Stage::TriangleList { small: true } => true,
+        Stage::CaseSorted(case) => case != BoxCase::Long,
+        _ => false,
+    };
+    let flat = stage == Stage::CaseSorted(BoxCase::Flat) && variant.mode == Mode::Conservative;
+    let mut constants = front(small, flat, stage == Stage::Tiled);
+    let mut files = stage.files().to_vec();
     match stage {
+        Stage::CaseSorted(case) => {
+            constants += &format!("const CASE: u32 = {}u;\n", case.code());
+            files.extend(case.files(variant.mode));
+        }
+        Stage::CaseSizes => constants += &format!("const MAX_GROUPS: u32 = {max_groups}u;\n"),
+        Stage::CountTiles | Stage::PairTiles | Stage::FindTiles | Stage::Tiled => {
+            let [x, y, z] = TILE_SHIFT;
+            let words = 1u32 << (x + y);
+            constants += &format!("const TILE_SHIFT: vec3<u32> = vec3<u32>({x}u, {y}u, {z}u);\n");
+            constants += &format!("const TILE_WORDS: u32 = {words}u;\nconst SHARE: u32 = {TILE_SHARE}u;\n");
+        }
         Stage::TriangleParallel { defers } => {
             let (heuristic, vertices) = defers.unwrap_or((Heuristic::default(), 1));
             let (hybrid, heuristic) = (defers.is_some(), heuristic.code());
@@ -223,14 +342,19 @@ pub(crate) fn source(stage: Stage, variant: Variant, tier: Tier, max_groups: u32
         }
         _ => {}
     }
-    assemble(variant, tier, &constants, stage.files(), stage.writes_voxels())
+    assemble(variant, tier, &constants, &files, stage.writes_voxels())
+}
+
+/// The constants that every stage knows.
+fn front(small: bool, flat: bool, tiled: bool) -> String {
+    format!("const SMALL: bool = {small};\nconst FLAT: bool = {flat};\nconst TILED: bool = {tiled};\n")
 }
 
 /// The WGSL of a vertex and a fragment stage.
 pub(crate) fn raster_source(raster: Raster, variant: Variant, tier: Tier) -> String {
     let (listed, dilation) = (raster.drawn == Drawn::Listed, raster.dilation.code());
     let constants =
-        format!("const SMALL: bool = false;\nconst LISTED: bool = {listed};\nconst DILATION: u32 = {dilation}u;\n");
+        front(false, false, false) + &format!("const LISTED: bool = {listed};\nconst DILATION: u32 = {dilation}u;\n");
     let claiming = match raster.drawn {
         Drawn::All | Drawn::Listed => &[],
         Drawn::Slices | Drawn::Slice => variant.sink.claiming_files(),
@@ -313,7 +437,17 @@ mod tests {
             Stage::ScanBlocks,
             Stage::AddTotals,
             Stage::Arguments { vertices: 3 },
+            Stage::ClassifyCases,
+            Stage::SortCases,
+            Stage::CaseSizes,
+            Stage::CountTiles,
+            Stage::PairTiles,
+            Stage::CountDigits,
+            Stage::MoveEntries,
+            Stage::FindTiles,
+            Stage::Tiled,
         ];
+        stages.extend(BoxCase::ALL.map(Stage::CaseSorted));
         for heuristic in Heuristic::ALL {
             stages.push(Stage::TriangleParallel { defers: Some((heuristic, 15)) });
             stages.push(Stage::Classify { heuristic });

@@ -19,7 +19,7 @@ use crate::timer::{PassTime, Timer};
 use crate::volume::GpuVolume;
 
 /// The strategies of this backend.
-pub const STRATEGIES: [Strategy; 7] = [
+pub const STRATEGIES: [Strategy; 9] = [
     Strategy::TriangleParallel,
     Strategy::FragmentParallel,
     Strategy::Hybrid,
@@ -27,6 +27,8 @@ pub const STRATEGIES: [Strategy; 7] = [
     Strategy::Balanced,
     Strategy::Sliced,
     Strategy::SlicePerPass,
+    Strategy::CaseSorted,
+    Strategy::Tiled,
 ];
 
 /// The strategies of this backend that have a mode.
@@ -384,8 +386,12 @@ impl Voxelizer {
             Strategy::Sliced => (MAX_PAIRS / self.dilation.vertices(), GpuError::TooManySlices),
             _ => (MAX_PAIRS, GpuError::TooManyColumns),
         };
-        if totals.iter().any(|total| *total > most) {
-            return Err(error);
+        match totals.iter().max() {
+            Some(needed) if *needed > most => return Err(error),
+            Some(&needed) if needed > status.room => {
+                return Err(GpuError::TooManyTiles { needed, room: status.room });
+            }
+            _ => {}
         }
         Ok(counters)
     }

@@ -93,7 +93,9 @@ fn more_workgroups_than_one_dimension_holds() {
     let job = Job::new(grid, Mode::Thin);
     let expected = on_cpu(&lattice, &job);
     let gpu = open("llvmpipe");
-    for strategy in [Strategy::TriangleParallel, Strategy::Hybrid, Strategy::Balanced] {
+    for strategy in
+        [Strategy::TriangleParallel, Strategy::Hybrid, Strategy::Balanced, Strategy::CaseSorted, Strategy::Tiled]
+    {
         let (found, _) = on_gpu(&gpu, &lattice, &job.with_strategy(strategy), &Options::default());
         assert!(found == expected, "{strategy}");
     }
@@ -278,10 +280,20 @@ fn counters_agree() {
                 }
                 Strategy::Hybrid => assert!(counters.fragments > 0 && counters.invocations == triangles),
                 Strategy::Balanced => assert_eq!(counters.invocations, triangles + counters.columns),
+                Strategy::CaseSorted | Strategy::Tiled => {
+                    assert!(counters.invocations >= 2 * triangles && counters.fragments == 0);
+                }
                 _ => assert!(counters.fragments > 0),
             }
-            // The same voxels are tested, whoever tests them.
-            tests.push(counters.voxel_tests);
+            let lane_use = counters.lane_use();
+            assert_eq!(lane_use.is_some(), counters.invocations > 0, "{strategy}");
+            assert!(lane_use.is_none_or(|share| share > 0.0 && share <= 1.0), "{strategy}: {lane_use:?}");
+            // The same voxels are tested, whoever tests them; but where the box's case decides, none need be.
+            if strategy == Strategy::CaseSorted {
+                assert!(tests.iter().all(|count| *count > counters.voxel_tests));
+            } else {
+                tests.push(counters.voxel_tests);
+            }
         }
     }
     assert!(tests.iter().all(|count| *count == tests[0]), "{tests:?}");
@@ -307,20 +319,47 @@ fn a_classification_serves_again() {
     }
 }
 
+fn callers_buffer(gpu: &Gpu, words: &[i32]) -> wgpu::Buffer {
+    let buffer = gpu.device().create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: words.len() as u64 * 4,
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    gpu.queue().write_buffer(&buffer, 0, &bytes);
+    buffer
+}
+
+#[test]
+fn tiles_of_unknown_meshes_have_bounded_room() {
+    // Each copy's box meets 16 x 16 x 8 tiles; what is known of uploaded meshes makes room for them.
+    const COPIES: i32 = 600;
+    const S: i32 = 65_536;
+    let gpu = open("llvmpipe");
+    let grid = unit_grid([256; 3]);
+    let job = Job::new(grid, Mode::Conservative).with_strategy(Strategy::Tiled);
+    let corners = [[1, 1, 1], [255, 2, 250], [3, 254, 9]];
+    let positions: Vec<i32> = corners.as_flattened().iter().map(|c| c * S).collect();
+    let indices: Vec<i32> = (0..3 * COPIES).map(|i| i % 3).collect();
+    let voxels = GpuVolume::new(&gpu, grid).unwrap();
+    let mut voxelizer = Voxelizer::new(&gpu, &job, &Options::default()).unwrap();
+    let [positions, indices] = [positions, indices].map(|words| callers_buffer(&gpu, &words));
+    let run = voxelizer.run(&GpuMesh::from_buffers(positions, indices, COPIES.cast_unsigned()), &voxels);
+    let most = 8 * COPIES.cast_unsigned() + (1 << 20);
+    assert!(
+        matches!(run, Err(GpuError::TooManyTiles { needed, room }) if needed == 2048 * COPIES.cast_unsigned() && room == most),
+        "{run:?}"
+    );
+    let mesh = zoo::soup(&vec![corners.map(|corner| corner.map(f64::from)); 600]);
+    let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
+    assert!(on_gpu(&gpu, &lattice, &job, &Options::default()).0 == on_cpu(&lattice, &job));
+}
+
 #[test]
 fn a_callers_buffers_are_used_as_they_are_and_checked() {
     let gpu = open("llvmpipe");
-    let buffer = |words: &[i32]| {
-        let buffer = gpu.device().create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size: words.len() as u64 * 4,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-        gpu.queue().write_buffer(&buffer, 0, &bytes);
-        buffer
-    };
+    let buffer = |words: &[i32]| callers_buffer(&gpu, words);
     const S: i32 = 65_536;
     let grid = unit_grid([8; 3]);
     let run = |strategy: Strategy, far: i32| {

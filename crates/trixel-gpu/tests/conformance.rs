@@ -77,6 +77,8 @@ mod lavapipe {
     trixel::conformance_suite!(sliced sliced, plain(&LAVAPIPE, Strategy::Sliced));
     trixel::conformance_suite!(sliced sliced_hasselgren_hull, sliced_hull(&LAVAPIPE));
     trixel::conformance_suite!(sliced slice_per_pass, plain(&LAVAPIPE, Strategy::SlicePerPass));
+    trixel::conformance_suite!(batched case_sorted, plain(&LAVAPIPE, Strategy::CaseSorted));
+    trixel::conformance_suite!(batched tiled, plain(&LAVAPIPE, Strategy::Tiled));
 }
 
 mod swiftshader {
@@ -91,4 +93,6 @@ mod swiftshader {
     trixel::conformance_suite!(batched balanced, plain(&SWIFTSHADER, Strategy::Balanced));
     trixel::conformance_suite!(sliced sliced, plain(&SWIFTSHADER, Strategy::Sliced));
     trixel::conformance_suite!(sliced slice_per_pass, plain(&SWIFTSHADER, Strategy::SlicePerPass));
+    trixel::conformance_suite!(batched case_sorted, plain(&SWIFTSHADER, Strategy::CaseSorted));
+    trixel::conformance_suite!(batched tiled, plain(&SWIFTSHADER, Strategy::Tiled));
 }

@@ -43,11 +43,17 @@ pub enum Strategy {
     Sliced,
     /// GPU, [`Mode::Sliced`] alone: the whole mesh once for each slice (Llamas 2007).
     SlicePerPass,
+    /// GPU: triangles sorted by whether their boxes extend along one, two or three axes, each case by code of its own
+    /// (Schwarz and Seidel 2010; \[HCV\]'s swizzle makes three cases of their nine).
+    CaseSorted,
+    /// GPU: pairs of tile and triangle, sorted; one workgroup a tile, which blends in its own memory (Pantaleoni's VoxelPipe,
+    /// 2011).
+    Tiled,
 }
 
 impl Strategy {
     /// Every strategy.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::Auto,
         Self::ColumnRuns,
         Self::TriangleParallel,
@@ -57,6 +63,8 @@ impl Strategy {
         Self::Balanced,
         Self::Sliced,
         Self::SlicePerPass,
+        Self::CaseSorted,
+        Self::Tiled,
     ];
 
     /// The name on the command line and in reports.
@@ -72,6 +80,8 @@ impl Strategy {
             Self::Balanced => "balanced",
             Self::Sliced => "sliced",
             Self::SlicePerPass => "slice-per-pass",
+            Self::CaseSorted => "case-sorted",
+            Self::Tiled => "tiled",
         }
     }
 

@@ -154,6 +154,8 @@ pub(crate) fn compute(
         Mode::Solid => {
             (Sink::Shell, Job::new(*job.grid(), Mode::Conservative).with_strategy(Strategy::TriangleParallel))
         }
+        // A tile's memory does not keep triangles apart.
+        _ if job.strategy() == Strategy::Tiled => (Sink::Pairs, job.with_strategy(Strategy::TriangleParallel)),
         _ => (Sink::Pairs, *job),
     };
     // One triangle each, so that no column can come twice.

@@ -1,8 +1,5 @@
 // One invocation a pair of triangle and column: the even distribution of work that [HCV] chapter 5 leaves for later.
 
-// How many pairs there are.
-@group(1) @binding(1) var<storage, read> total: u32;
-
 // The first invocation of each triangle in a workgroup makes it ready for the others.
 var<workgroup> ready: array<Triangle, WORKGROUP>;
 
@@ -34,4 +31,5 @@ fn balanced(
         _ = voxelize_column(t, rect.x + i32(column % width), rect.y + i32(column / width));
         flush_counters();
     }
+    count_lanes(local);
 }

@@ -89,8 +89,9 @@ fn voxelize_column(t: Triangle, a: i32, b: i32) -> bool {
     let slab_from = swizzle(slab_low(), axis).z - t.base.z;
     let slab_to = swizzle(slab_high(), axis).z - t.base.z;
     if MODE == SOLID {
-        let first = max(depth_range(t, a, b, 0, t.extent.z + 1).x, slab_from);
-        if first > slab_to {
+        // What lies below the grid still toggles the whole column, from the grid's lowest voxel on.
+        let first = max(depth_range(t, a, b, 0, t.extent.z + 1).x, -t.base.z);
+        if first < slab_from || first > slab_to {
             return false;
         }
         toggle_voxel(t.base + vec3<i32>(a, b, first));

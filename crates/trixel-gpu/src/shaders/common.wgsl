@@ -1,4 +1,4 @@
-// What every stage of a voxelization sees. The constants MODE and COUNTING are prepended.
+// What every stage of a voxelization sees. The constants MODE, COUNTING and TILED are prepended.
 
 const CONSERVATIVE: u32 = 0u;
 const THIN: u32 = 1u;
@@ -61,12 +61,22 @@ fn corners(triangle: u32) -> Corners {
     );
 }
 
-// The lowest and the highest voxel of the slab.
+// The tile of the slab that an invocation is confined to, where TILED.
+var<private> tile_low: vec3<i32>;
+var<private> tile_high: vec3<i32>;
+
+// The lowest and the highest voxel of the slab, or of what it is confined to.
 fn slab_low() -> vec3<i32> {
+    if TILED {
+        return tile_low;
+    }
     return vec3<i32>(params.slab_x, 0, 0);
 }
 
 fn slab_high() -> vec3<i32> {
+    if TILED {
+        return tile_high;
+    }
     return vec3<i32>(params.slab_x + params.slab_nx - 1, params.dims.yz - 1);
 }
 

@@ -10,6 +10,8 @@ const COUNT_TESTS: u32 = 4u;
 const COUNT_WRITTEN: u32 = 5u;
 const COUNT_ATOMICS: u32 = 6u;
 const COUNT_TOO_LARGE: u32 = 7u;
+const COUNT_LANE_WORK: u32 = 8u;
+const COUNT_LANE_SLOTS: u32 = 9u;
 
 var<private> columns_here: u32 = 0u;
 var<private> tests_here: u32 = 0u;

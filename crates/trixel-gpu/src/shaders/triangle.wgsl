@@ -2,7 +2,8 @@
 //
 // All coordinates are swizzled to (a, b, c) with columns along c, and local: voxel indices count from `base`, the low
 // corner of the triangle's box of voxels. Extents below 2^29 steps (MAX_EXTENT in limits.rs) keep every 32-bit number
-// here in range. Where SMALL, they are below 2^22 (64 voxels), and fewer numbers need to be cut in halves.
+// here in range. Where SMALL, they are below 2^22 (64 voxels), and fewer numbers need to be cut in halves. Where FLAT, the box
+// is known to be one voxel thick, and the columns run across it.
 
 struct Triangle {
     // Components of the three edges; edge k starts at corner k.
@@ -113,6 +114,10 @@ fn shape_of(t: Corners) -> Shape {
         if u64_less(z, x) || u64_less(z, y) {
             axis = select(0u, 1u, u64_less(x, y));
         }
+    }
+    if FLAT {
+        let size = top - base;
+        axis = select(select(2u, 1u, size.y == 0), 0u, size.x == 0);
     }
     s.v0 = swizzle(t.v0, axis);
     s.v1 = swizzle(t.v1, axis);

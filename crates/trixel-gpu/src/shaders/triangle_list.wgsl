@@ -3,13 +3,7 @@
 @group(1) @binding(0) var<storage, read> list: array<u32>;
 @group(1) @binding(1) var<storage, read> listed: u32;
 
-@compute @workgroup_size(WORKGROUP)
-fn triangle_list(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let i = invocation(group, groups, local);
+fn take_listed(i: u32) {
     if i >= listed {
         return;
     }
@@ -22,4 +16,14 @@ fn triangle_list(
         voxelize_columns(triangle_of(shape), params.first_column);
         flush_counters();
     }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn triangle_list(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    take_listed(invocation(group, groups, local));
+    count_lanes(local);
 }

@@ -7,13 +7,7 @@
 // VERTICES times the list's length: 1 is prepended, or in the hybrid what makes this the vertex count of its draw.
 @group(1) @binding(1) var<storage, read_write> listed: atomic<u32>;
 
-@compute @workgroup_size(WORKGROUP)
-fn triangle_parallel(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let i = invocation(group, groups, local);
+fn take_triangle(i: u32) {
     if i >= params.triangles {
         return;
     }
@@ -28,4 +22,14 @@ fn triangle_parallel(
     painting = i;
     voxelize_columns(triangle_of(look.shape), 0u);
     flush_counters();
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn triangle_parallel(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    take_triangle(invocation(group, groups, local));
+    count_lanes(local);
 }

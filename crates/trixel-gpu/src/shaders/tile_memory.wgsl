@@ -1,0 +1,17 @@
+// A tile in the workgroup's own memory: TILE_SHIFT says that a column of it is one word.
+
+var<workgroup> tile_words: array<atomic<u32>, TILE_WORDS>;
+
+fn tile_word(column: vec2<i32>) -> u32 {
+    let side = (vec2<i32>(1) << TILE_SHIFT.xy) - 1;
+    let at = vec2<u32>(column & side);
+    return (at.x << TILE_SHIFT.y) | at.y;
+}
+
+fn or_word(column: vec2<i32>, index: u32, bits: u32) {
+    atomicOr(&tile_words[tile_word(column)], bits);
+}
+
+fn flip_word(column: vec2<i32>, index: u32, bits: u32) {
+    atomicXor(&tile_words[tile_word(column)], bits);
+}
