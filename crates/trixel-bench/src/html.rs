@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use crate::lists;
 use crate::plot::{Line, plot};
-use crate::published::{HCV, HCV_HARDWARE};
-use crate::results::{Cell, Results};
+use crate::published::{CL, CL_HARDWARE, CL_RESOLUTIONS, HCV, HCV_HARDWARE};
+use crate::results::{Cell, Results, SLICE_PER_PASS, SLICED};
 use crate::text::{lane_use, ms};
 
 const STYLE: &str = "
@@ -53,7 +53,11 @@ pub fn page(results: &Results) -> String {
     list_methods(results, &mut out);
     figures(results, &mut out);
     counters(results, &mut out);
-    published(&mut out);
+    if results.columns().iter().any(|column| [SLICED, SLICE_PER_PASS].contains(column)) {
+        published_slices(&mut out);
+    } else {
+        published(&mut out);
+    }
     out.push_str("</body>\n</html>\n");
     out
 }
@@ -76,6 +80,8 @@ fn table(results: &Results, out: &mut String) {
     let columns = results.columns();
     let mut names = vec!["mesh", "triangles", "at"];
     names.extend(columns.iter().map(|(_, strategy)| *strategy));
+    let compared = columns.contains(&SLICED) && columns.contains(&SLICE_PER_PASS);
+    names.extend(compared.then_some("ratio"));
     names.extend(["cutoff", "voxels", "wrong"]);
     head(&names, out);
     for mesh in results.meshes() {
@@ -98,6 +104,11 @@ fn table(results: &Results, out: &mut String) {
                         ms(cell.max_ms)
                     ),
                 };
+            }
+            if let Some(ratio) = results.slicing_ratio(mesh, resolution) {
+                let _ = write!(out, "<td>{ratio:.1}</td>");
+            } else if compared {
+                out.push_str("<td></td>");
             }
             let wrong: u64 = some().map(|cell| cell.wrong_voxels).sum();
             let cutoff = some().find_map(|cell| cell.cutoff).map_or(String::new(), |cutoff| format!("{cutoff:.1}"));
@@ -214,6 +225,19 @@ fn counters(results: &Results, out: &mut String) {
             let _ = write!(out, "<td>{value}</td>");
         }
         let _ = writeln!(out, "<td>{}</td></tr>", lane_use(&c));
+    }
+    out.push_str(END);
+}
+
+fn published_slices(out: &mut String) {
+    let _ = write!(out, "<h2>As published</h2>\n<p class=\"note\">Not measured here: {}.</p>\n", escape(CL_HARDWARE));
+    head(&["model", "triangles", "at", "sliced", "slice-per-pass", "ratio"], out);
+    for row in &CL {
+        for ((resolution, sliced), per_pass) in CL_RESOLUTIONS.iter().zip(row.sliced).zip(row.slice_per_pass) {
+            let (model, triangles, ratio) = (row.model, row.triangles, per_pass / sliced);
+            let _ = write!(out, "<tr><td>{model}</td><td>{triangles}</td><td>{resolution}</td><td>{}</td>", ms(sliced));
+            let _ = writeln!(out, "<td>{}</td><td>{ratio:.1}</td></tr>", ms(per_pass));
+        }
     }
     out.push_str(END);
 }

@@ -1,5 +1,5 @@
-//! Measuring trixel as the papers measured themselves: \[HCV\] table 4.1 and its figures, on any adapter and on the CPU, with
-//! the wrong voxels counted beside every time.
+//! Measuring trixel as the papers measured themselves: \[HCV\] table 4.1 and its figures, \[CL\] table 1, on any adapter
+//! and on the CPU, with the wrong voxels counted beside every time.
 //!
 //! [`measure`] fills [`Results`]; [`text`] and [`html`] show them, [`compare`] sets them beside older ones, and [`published`]
 //! holds the papers' own numbers. Results are plain data for `serde`.
@@ -9,6 +9,7 @@ mod plot;
 mod subjects;
 
 pub mod compare;
+pub mod fills;
 pub mod html;
 pub mod lists;
 pub mod measure;

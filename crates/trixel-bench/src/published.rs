@@ -52,6 +52,39 @@ pub const HCV: [HcvRow; 15] = {
     ]
 };
 
+/// One row of \[CL\] table 1: both algorithms at 128, 256 and 512.
+#[derive(Clone, Copy, Debug)]
+pub struct ClRow {
+    /// The model.
+    pub model: &'static str,
+    /// Its triangles.
+    pub triangles: u64,
+    /// The paper's own.
+    pub sliced: [f64; 3],
+    /// The mesh once per slice, after Llamas 2007.
+    pub slice_per_pass: [f64; 3],
+}
+
+/// The hardware of [`CL`].
+pub const CL_HARDWARE: &str = "ATI HD5850, Intel Core 2 Duo E6750; Chang and Lai 2011, table 1";
+
+/// The resolutions of [`CL`].
+pub const CL_RESOLUTIONS: [u32; 3] = [128, 256, 512];
+
+/// \[CL\] table 1.
+pub const CL: [ClRow; 6] = [
+    cl_row("Torus", 800, [1.66, 3.73, 10.91], [2.67, 7.29, 641.03]),
+    cl_row("Venusm", 43_357, [3.19, 5.04, 12.41], [12.41, 73.02, 746.27]),
+    cl_row("Horse", 96_966, [4.28, 7.65, 15.09], [15.09, 156.99, 925.93]),
+    cl_row("Hand", 654_666, [11.5, 20.0, 27.68], [27.68, 632.91, 2500.0]),
+    cl_row("Dragon", 871_414, [16.54, 23.85, 31.06], [31.06, 1282.05, 3448.28]),
+    cl_row("Happy", 1_087_716, [16.36, 24.71, 31.58], [31.58, 1724.14, 4347.82]),
+];
+
+const fn cl_row(model: &'static str, triangles: u64, sliced: [f64; 3], slice_per_pass: [f64; 3]) -> ClRow {
+    ClRow { model, triangles, sliced, slice_per_pass }
+}
+
 const fn row(
     (model, triangles): (&'static str, u64),
     resolution: u32,

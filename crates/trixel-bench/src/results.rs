@@ -6,6 +6,10 @@ use trixel_gpu::Counters;
 /// The version of the stored form; a change that old readers would misread raises it.
 pub const SCHEMA: u32 = 1;
 
+/// The columns that \[CL\] table 1 compares.
+pub(crate) const SLICED: (&str, &str) = ("gpu", "sliced");
+pub(crate) const SLICE_PER_PASS: (&str, &str) = ("gpu", "slice-per-pass");
+
 /// Everything that one run of the benchmark measured.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Results {
@@ -150,6 +154,13 @@ impl Results {
         self.cells.iter().find(|cell| {
             cell.mesh == mesh && cell.resolution == resolution && cell.backend == backend && cell.strategy == strategy
         })
+    }
+
+    /// How many times as long the whole mesh once per slice takes as each triangle in its own slices: \[CL\] table 1.
+    #[must_use]
+    pub fn slicing_ratio(&self, mesh: &str, resolution: u32) -> Option<f64> {
+        let time = |column| self.cell(mesh, resolution, column).map(|cell| cell.median_ms);
+        time(SLICED).zip(time(SLICE_PER_PASS)).map(|(sliced, per_pass)| per_pass / sliced)
     }
 
     /// Voxels that differ from the CPU's, over all cells and lists.

@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use trixel_gpu::Counters;
 
-use crate::published::{HCV, HCV_HARDWARE};
-use crate::results::Results;
+use crate::published::{CL, CL_HARDWARE, CL_RESOLUTIONS, HCV, HCV_HARDWARE};
+use crate::results::{self, Results};
 
 /// Rows of cells under a head, each column as wide as it must be; the first is left-aligned.
 pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
@@ -43,6 +43,8 @@ pub fn table(results: &Results) -> String {
     let columns = results.columns();
     let mut head = vec!["mesh".to_owned(), "triangles".to_owned(), "at".to_owned()];
     head.extend(columns.iter().map(|(_, strategy)| (*strategy).to_owned()));
+    let compared = columns.contains(&results::SLICED) && columns.contains(&results::SLICE_PER_PASS);
+    head.extend(compared.then(|| "ratio".to_owned()));
     head.extend(["@voxels^2".to_owned(), "wrong".to_owned()]);
     let mut rows = vec![head];
     for mesh in results.meshes() {
@@ -52,6 +54,9 @@ pub fn table(results: &Results) -> String {
             let triangles = some().next().map_or(0, |cell| cell.triangles);
             let mut row = vec![mesh.to_owned(), triangles.to_string(), resolution.to_string()];
             row.extend(cells.iter().map(|cell| cell.map_or(String::new(), |cell| ms(cell.median_ms))));
+            if compared {
+                row.push(results.slicing_ratio(mesh, resolution).map_or(String::new(), |ratio| format!("{ratio:.1}")));
+            }
             row.push(some().find_map(|cell| cell.cutoff).map_or(String::new(), |cutoff| format!("{cutoff:.1}")));
             row.push(some().map(|cell| cell.wrong_voxels).sum::<u64>().to_string());
             rows.push(row);
@@ -104,6 +109,26 @@ pub fn published() -> String {
 /// The share of lanes at work, as a percentage; nothing where all work was the rasterizer's.
 pub(crate) fn lane_use(counters: &Counters) -> String {
     counters.lane_use().map_or(String::new(), |share| format!("{:.0} %", 100.0 * share))
+}
+
+/// \[CL\] table 1 as the paper has it, with the ratio of its columns.
+#[must_use]
+pub fn published_cl() -> String {
+    let head = ["mesh", "triangles", "at", "sliced", "slice-per-pass", "ratio"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for row in &CL {
+        for ((resolution, sliced), per_pass) in CL_RESOLUTIONS.iter().zip(row.sliced).zip(row.slice_per_pass) {
+            rows.push(vec![
+                row.model.to_owned(),
+                row.triangles.to_string(),
+                resolution.to_string(),
+                ms(sliced),
+                ms(per_pass),
+                format!("{:.1}", per_pass / sliced),
+            ]);
+        }
+    }
+    format!("As published, not measured here: {CL_HARDWARE}\n\n{}", aligned(&rows))
 }
 
 /// What the shaders counted.

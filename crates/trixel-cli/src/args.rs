@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::builder::styling::{AnsiColor, Styles};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use trixel::attributes::{AttributeKind, Combine};
+use trixel::fill::Fill;
 use trixel::{Grid, Job, Mode, Strategy, UpAxis};
 use trixel_gpu::{Dilation, Heuristic, ListMethod};
 
@@ -300,6 +301,10 @@ pub(crate) struct MethodArgs {
         value_parser = parse_overlap)]
     pub(crate) overlap: f64,
 
+    /// How mode `solid` finds the inside; all but `parity` from the voxels of mode `sliced`, which is not exact.
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) fill: FillArg,
+
     /// Who computes: `auto` takes the best there is.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) backend: BackendArg,
@@ -459,6 +464,8 @@ const BENCH_EXAMPLES: &str = "\
 Examples:
   trixel bench --table hcv --html report.html --json results.json
   trixel bench bunny.ply scene:room -r 256 --counters
+  trixel bench --table cl torus.obj horse.ply dragon.ply
+  trixel bench --table fills bunny.ply -r 64,128,256
   trixel bench --figure 3.13 --figure 3.14 scene:room --html sweep.html
   trixel bench --lists bunny.ply scene:room
   trixel bench --compare results.json";
@@ -537,11 +544,15 @@ pub(crate) struct BenchArgs {
     pub(crate) compare: Option<PathBuf>,
 }
 
-/// A table of a paper.
+/// A table of a paper, or of how far its methods are off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum TableArg {
     /// Rauwendaal 2012, table 4.1.
     Hcv,
+    /// Chang and Lai 2011, table 1: `sliced` against `slice-per-pass`.
+    Cl,
+    /// No times, but how many voxels the fills of Chang and Lai 2011 get wrong.
+    Fills,
 }
 
 /// A figure of Rauwendaal 2012.
@@ -607,6 +618,28 @@ impl From<ModeArg> for Mode {
     }
 }
 
+/// [`Fill`] on the command line.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(crate) enum FillArg {
+    /// Exact: the triangles below each voxel's centre are counted.
+    #[default]
+    Parity,
+    /// Boundary voxels switch between outside and inside, slice after slice; odd columns take what most neighbours have.
+    Xor,
+    /// Columns are marched along; odd ones get the mean thickness of their neighbours.
+    March,
+}
+
+impl From<FillArg> for Fill {
+    fn from(fill: FillArg) -> Self {
+        match fill {
+            FillArg::Parity => Self::Parity,
+            FillArg::Xor => Self::Xor,
+            FillArg::March => Self::March,
+        }
+    }
+}
+
 /// The backends of this build.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(crate) enum BackendArg {
@@ -665,6 +698,10 @@ pub(crate) enum StrategyArg {
     CaseSorted,
     /// GPU: triangles binned to tiles and sorted, one workgroup a tile (VoxelPipe, 2011).
     Tiled,
+    /// GPU, mode sliced: each triangle once for each slice that it may meet, in one draw.
+    Sliced,
+    /// GPU, mode sliced: the whole mesh once for each slice.
+    SlicePerPass,
 }
 
 impl From<StrategyArg> for Strategy {
@@ -679,6 +716,8 @@ impl From<StrategyArg> for Strategy {
             StrategyArg::Balanced => Self::Balanced,
             StrategyArg::CaseSorted => Self::CaseSorted,
             StrategyArg::Tiled => Self::Tiled,
+            StrategyArg::Sliced => Self::Sliced,
+            StrategyArg::SlicePerPass => Self::SlicePerPass,
         }
     }
 }

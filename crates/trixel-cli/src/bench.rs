@@ -7,10 +7,11 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, anyhow, bail};
 use trixel::{Mode, Strategy};
+use trixel_bench::fills::Fills;
 use trixel_bench::measure::Plan;
 use trixel_bench::results::SCHEMA;
 use trixel_bench::{Results, compare, html, lists, text};
-use trixel_gpu::{AdapterChoice, Gpu, GpuError, STRATEGIES};
+use trixel_gpu::{AdapterChoice, Gpu, GpuError, STRATEGIES, strategies_of};
 use trixel_io::atomic_file::{AtomicFile, Staged};
 
 use crate::args::{BackendArg, BenchArgs, FigureArg, TableArg};
@@ -25,7 +26,11 @@ const LOW_CUTOFFS: [f32; 14] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6
 const HIGH_CUTOFFS: [f32; 7] = [32.0, 64.0, 128.0, 256.0, 512.0, 1024.0, 2048.0];
 
 pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
-    let strategies = strategies(args);
+    if args.table == Some(TableArg::Fills) {
+        return fills(args);
+    }
+    let mode = mode(args);
+    let strategies = strategies(args, mode);
     set_threads(args.threads)?;
     // Found out before the work: what cannot be read or written.
     let before = args.compare.as_deref().map(read_results).transpose()?;
@@ -38,11 +43,9 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
     if args.lists && gpu.is_none() {
         usage("--lists compares what GPUs do, and there is none here; a software one will do");
     }
-    // The paper's table is of thin voxels.
-    let default_mode = if args.table == Some(TableArg::Hcv) { Mode::Thin } else { Mode::Conservative };
     let plan = Plan {
         resolutions: args.resolutions.clone(),
-        mode: args.mode.map_or(default_mode, Mode::from),
+        mode,
         strategies,
         cpu: !matches!(args.backend, BackendArg::Gpu),
         runs: args.repeat.get() as usize,
@@ -74,7 +77,10 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
     parts.extend(lists::text(&results));
     parts.extend(text::counters(&results));
     parts.extend(text::sweeps(&results));
-    parts.extend(args.table.map(|TableArg::Hcv| text::published()));
+    parts.extend(args.table.map(|table| match table {
+        TableArg::Cl => text::published_cl(),
+        TableArg::Hcv | TableArg::Fills => text::published(),
+    }));
     parts.extend(before.map(|before| compare::text(&results, &before)));
     match write!(std::io::stdout().lock(), "{}", parts.join("\n")) {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => {}
@@ -89,15 +95,57 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
     }
 }
 
+/// `--table fills`: no times, and all of it on the processor.
+fn fills(args: &BenchArgs) -> Result<ExitCode> {
+    if args.json.is_some() || args.html.is_some() || args.compare.is_some() {
+        usage("--table fills is printed, and has no times to write or compare; leave --json, --html and --compare out");
+    }
+    set_threads(args.threads)?;
+    let reporter = Reporter::new(false);
+    let mut table = Fills::default();
+    for (name, input) in &inputs(args)? {
+        let (loaded, _) = reporter.stage(&format!("reading {input}"), || mesh::load(input, false, &reporter));
+        let loaded = loaded?;
+        for &resolution in &args.resolutions {
+            let (counted, _) =
+                reporter.stage(&format!("{name} at {resolution}"), || table.count(name, &loaded, resolution));
+            counted.map_err(|error| anyhow!("{input}: {error}"))?;
+        }
+    }
+    reporter.finish();
+    match write!(std::io::stdout().lock(), "{}", table.text()) {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => {}
+        written => written.context("cannot write to standard output")?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The mode asked for, or that of the paper's table.
+fn mode(args: &BenchArgs) -> Mode {
+    let default = match args.table {
+        Some(TableArg::Hcv) => Mode::Thin,
+        Some(TableArg::Cl) => Mode::Sliced,
+        Some(TableArg::Fills) | None => Mode::Conservative,
+    };
+    args.mode.map_or(default, Mode::from)
+}
+
 /// The strategies of the GPU that were asked for, or all.
-fn strategies(args: &BenchArgs) -> Vec<Strategy> {
+fn strategies(args: &BenchArgs, mode: Mode) -> Vec<Strategy> {
     let asked: Vec<Strategy> = args.strategy.iter().map(|&strategy| strategy.into()).collect();
     if let Some(other) = asked.iter().find(|strategy| !STRATEGIES.contains(strategy)) {
         usage(&format!(
             "--strategy chooses among the GPU's, and `{other}` is none; --backend cpu measures the processor"
         ));
     }
-    if asked.is_empty() { STRATEGIES.to_vec() } else { asked }
+    if let Some(other) = asked.iter().find(|strategy| !strategy.modes().contains(&mode)) {
+        usage(&format!("--strategy {other} has no mode {mode}"));
+    }
+    match args.table {
+        _ if !asked.is_empty() => asked,
+        Some(TableArg::Cl) if mode == Mode::Sliced => vec![Strategy::Sliced, Strategy::SlicePerPass],
+        _ => strategies_of(mode).collect(),
+    }
 }
 
 /// Names and meshes.

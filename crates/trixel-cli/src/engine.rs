@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use anyhow::Result;
 use trixel::attributes::{AttributeRequest, VoxelAttributes};
+use trixel::fill::{Fill, FillReport};
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, CpuBackend, Job, Mesh, Strategy, Volume, VoxelOrder};
+use trixel::{Backend, Bytes, CpuBackend, Job, Mesh, Mode, Strategy, Volume, VoxelOrder};
 use trixel_gpu::{
     AdapterChoice, Counters, Cutoff, Gpu, GpuError, GpuMesh, GpuSurface, GpuVolume, Heuristic, ListMethod, Options,
     STRATEGIES, Voxelizer,
@@ -33,10 +34,19 @@ pub(crate) struct Task<'a> {
     pub(crate) mesh: &'a Mesh,
     pub(crate) lattice: &'a LatticeMesh<'a>,
     pub(crate) job: &'a Job,
+    /// How a solid's inside is found.
+    pub(crate) fill: Fill,
     pub(crate) repeat: u32,
     pub(crate) attributes: Option<&'a AttributeRequest>,
     /// How a GPU is to list the voxels.
     pub(crate) list_method: Option<ListMethod>,
+}
+
+impl Task<'_> {
+    /// The job of the voxels that are filled; none where a solid's own job finds the inside.
+    fn boundary(&self) -> Option<Job> {
+        (self.fill != Fill::Parity).then(|| Job::new(*self.job.grid(), Mode::Sliced).with_strategy(self.job.strategy()))
+    }
 }
 
 /// What a run did.
@@ -51,12 +61,22 @@ pub(crate) struct Ran {
     pub(crate) upload_ms: Option<f64>,
     pub(crate) samples_ms: Vec<f64>,
     pub(crate) download_ms: Option<f64>,
+    /// What became of the columns that were filled.
+    pub(crate) fill: Option<FillReport>,
     pub(crate) list: Option<ListReport>,
     /// Attributes, where the device found them, and how long it took.
     pub(crate) attributes: Option<(VoxelAttributes, f64)>,
 }
 
 impl Engine {
+    /// The mode that is voxelized before anything is filled.
+    fn voxelized_mode(method: &MethodArgs) -> Mode {
+        match method.fill.into() {
+            Fill::Parity => method.mode.into(),
+            Fill::Xor | Fill::March => Mode::Sliced,
+        }
+    }
+
     /// Whether the arguments ask for a GPU by name.
     fn is_gpu_named(method: &MethodArgs) -> bool {
         matches!(method.backend, BackendArg::Gpu) || method.gpu.adapter.is_some()
@@ -71,6 +91,11 @@ impl Engine {
     pub(crate) fn check(method: &MethodArgs) {
         let strategy = Strategy::from(method.strategy);
         let of_gpu = STRATEGIES.contains(&strategy);
+        let mode = Self::voxelized_mode(method);
+        if !strategy.modes().contains(&mode) {
+            let modes: Vec<&str> = strategy.modes().iter().map(|mode| mode.name()).collect();
+            usage(&format!("--strategy {strategy} is for --mode {}, not for {mode}", modes.join(" or ")));
+        }
         if matches!(method.backend, BackendArg::Cpu) {
             if method.gpu.adapter.is_some() {
                 usage("--adapter names a GPU, but --backend cpu asks for the processor; leave one of them out");
@@ -150,7 +175,18 @@ impl Engine {
 }
 
 fn run_on_cpu(task: &Task<'_>, volume: &mut Volume, reporter: &Reporter) -> Result<Ran> {
-    on_cpu(task.repeat, reporter, || CpuBackend::default().voxelize(task.lattice, task.job, volume))
+    let mut report = None;
+    let ran = on_cpu(task.repeat, reporter, || {
+        let Some(boundary) = task.boundary() else {
+            return CpuBackend::default().voxelize(task.lattice, task.job, volume);
+        };
+        let strategy = CpuBackend::default().voxelize(task.lattice, &boundary, volume)?;
+        let (filled, filling) = trixel::fill::fill(volume, task.fill)?;
+        *volume = filled;
+        report = Some(filling);
+        Ok(strategy)
+    })?;
+    Ok(Ran { fill: report, ..ran })
 }
 
 /// Runs a voxelization on the CPU `repeat` times.
@@ -177,6 +213,7 @@ pub(crate) fn on_cpu(
         upload_ms: None,
         samples_ms,
         download_ms: None,
+        fill: None,
         list: None,
         attributes: None,
     })
@@ -189,16 +226,26 @@ fn run_on_gpu(
     volume: &mut Volume,
     reporter: &Reporter,
 ) -> Result<Ran, GpuError> {
-    let (mesh, job) = (task.lattice, task.job);
+    let boundary = task.boundary();
+    let (mesh, job) = (task.lattice, boundary.as_ref().unwrap_or(task.job));
     let (voxelizer, check_ms) =
         reporter.stage("checking the GPU and building its pipelines", || Voxelizer::new(gpu, job, options));
     let mut voxelizer = voxelizer?;
     let (on_gpu, upload_ms) = reporter.stage("uploading", || GpuMesh::upload(gpu, mesh));
     let on_gpu = on_gpu?;
-    let voxels = GpuVolume::new(gpu, *job.grid())?;
+    let mut voxels = GpuVolume::new(gpu, *job.grid())?;
+    let mut report = None;
     let mut samples_ms = vec![];
     for _ in 0..task.repeat {
-        let (ran, ms) = reporter.stage("voxelizing", || voxelizer.run(&on_gpu, &voxels));
+        let (ran, ms) = reporter.stage("voxelizing", || -> Result<(), GpuError> {
+            voxelizer.run(&on_gpu, &voxels)?;
+            if boundary.is_some() {
+                let (filled, filling) = voxels.filled(gpu, task.fill)?;
+                voxels = filled;
+                report = Some(filling);
+            }
+            Ok(())
+        });
         ran?;
         samples_ms.push(ms);
     }
@@ -209,10 +256,15 @@ fn run_on_gpu(
     let download_ms = start.elapsed().as_secs_f64() * 1e3;
     let list =
         task.list_method.map(|method| list(&mut voxelizer, &on_gpu, method, task.repeat, reporter)).transpose()?;
-    let attributes = task.attributes.and_then(|request| {
+    // Of filled voxels the processor finds them: the voxelizer's own are the slices.
+    let request = task.attributes.filter(|_| boundary.is_none());
+    let attributes = request.and_then(|request| {
         let (found, ms) = reporter.stage("finding attributes", || {
             let surface = GpuSurface::upload(gpu, task.mesh, mesh, job.grid(), request)?;
-            voxelizer.attributes(&surface, &voxels)?.download(gpu, task.mesh)
+            let found = voxelizer.attributes(&surface, &voxels)?;
+            let [rows, scratch, uploaded] = [found.bytes(), found.scratch_bytes(), surface.bytes()].map(Bytes);
+            reporter.say(&format!("attributes: {rows}, {scratch} to find them, {uploaded} of surfaces and textures"));
+            found.download(gpu, task.mesh)
         });
         match found {
             Ok(attributes) => Some((attributes, ms)),
@@ -237,6 +289,7 @@ fn run_on_gpu(
         download_ms: Some(download_ms),
         list,
         attributes,
+        fill: report,
     })
 }
 

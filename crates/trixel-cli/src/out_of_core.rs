@@ -6,6 +6,7 @@ use std::time::{Instant, UNIX_EPOCH};
 
 use anyhow::{Context, Result, anyhow};
 use serde_json::json;
+use trixel::fill::Fill;
 use trixel::{Bytes, CpuBackend, Job, Mesh, Mode, Topology};
 use trixel_io::atomic_file::AtomicFile;
 use trixel_io::out_of_core::{OutOfCore, Plan, Source, check_target, partial_path};
@@ -36,6 +37,9 @@ pub(crate) fn target(args: &VoxelizeArgs) -> Option<PathBuf> {
                 usage(
                     "a .zarr output is written tile by tile by the processor; leave --backend, --adapter and --strategy out",
                 );
+            }
+            if Fill::from(args.method.fill) != Fill::Parity {
+                usage("a .zarr output is written tile by tile, and --fill looks at whole columns; leave it out");
             }
             if !args.attributes.attributes.is_empty() {
                 usage("a .zarr output has no attributes; write .npz or .vti for them");

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 use trixel::attributes::VoxelAttributes;
-use trixel::{Bytes, Grid, Mesh, Topology};
+use trixel::fill::{Fill, FillReport};
+use trixel::{Bytes, Grid, Job, Mesh, Mode, Topology};
 use trixel_gpu::{AdapterInfo, Counters, Cutoff, GpuVoxelList, ListMethod};
 
 /// What `--report` writes.
@@ -14,6 +15,8 @@ pub(crate) struct Report {
     pub(crate) grid: GridReport,
     pub(crate) mode: &'static str,
     pub(crate) overlap: f64,
+    /// How a solid was filled; null in other modes.
+    pub(crate) fill: Option<FillRecord>,
     pub(crate) backend: &'static str,
     pub(crate) strategy: &'static str,
     pub(crate) threads: usize,
@@ -37,6 +40,26 @@ pub(crate) struct Report {
     pub(crate) peak_memory_bytes: Option<u64>,
     pub(crate) outputs: Vec<String>,
     pub(crate) warnings: Vec<String>,
+}
+
+/// How a solid's inside was found.
+#[derive(Debug, Serialize)]
+pub(crate) struct FillRecord {
+    pub(crate) name: &'static str,
+    /// Columns with an odd number of boundary voxels, and those of them that could not be corrected; null by parity, which
+    /// looks at none.
+    pub(crate) questionable_columns: Option<u64>,
+    pub(crate) uncorrected_columns: Option<u64>,
+}
+
+impl FillRecord {
+    pub(crate) fn new(job: &Job, fill: Fill, report: Option<FillReport>) -> Option<Self> {
+        (job.mode() == Mode::Solid).then(|| Self {
+            name: fill.name(),
+            questionable_columns: report.map(|report| report.questionable),
+            uncorrected_columns: report.map(|report| report.uncorrected),
+        })
+    }
 }
 
 /// The mesh in a report and in `info --json`.

@@ -31,7 +31,15 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<ExitCode> {
     let (expected, _) = reporter.stage("voxelizing", || -> Result<Volume> {
         let lattice = LatticeMesh::snap(&mesh, job.grid()).with_context_of(&args.mesh)?;
         let mut volume = allocate(&job)?;
-        let task = Task { mesh: &mesh, lattice: &lattice, job: &job, repeat: 1, attributes: None, list_method: None };
+        let task = Task {
+            mesh: &mesh,
+            lattice: &lattice,
+            job: &job,
+            fill: args.method.fill.into(),
+            repeat: 1,
+            attributes: None,
+            list_method: None,
+        };
         Engine::open(&args.method, &reporter)?.run(&task, &mut volume, &reporter)?;
         Ok(volume)
     });

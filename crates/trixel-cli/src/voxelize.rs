@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use anyhow::{Result, bail};
 use trixel::attributes::{Described, compute};
+use trixel::fill::{Fill, FillReport};
 use trixel::lattice::LatticeMesh;
 use trixel::{Bytes, Job, Mode, Rank, Topology, Volume};
 use trixel_io::VolumeFormat;
@@ -18,7 +19,7 @@ use crate::args::{MethodArgs, VoxelizeArgs};
 use crate::engine::{Engine, Task};
 use crate::grid::{GridRequest, usage};
 use crate::progress::Reporter;
-use crate::report::{AttributesReport, GridReport, MeshReport, Report, Samples, Stages, median};
+use crate::report::{AttributesReport, FillRecord, GridReport, MeshReport, Report, Samples, Stages, median};
 use crate::voxels::Voxels;
 use crate::{attributes, memory, mesh, out_of_core, volume};
 
@@ -32,6 +33,11 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
         usage("nothing to write: give -o OUT (for example -o voxels.npz) or --report FILE.json");
     }
     check_method(&args.method);
+    if args.list_method.is_some() && Fill::from(args.method.fill) != Fill::Parity {
+        usage(
+            "--list-method lists voxels while they are voxelized, and --fill finds them later; leave one of them out",
+        );
+    }
     Engine::check_list_method(&args);
     args.outputs.iter().try_for_each(|output| volume::check_extension(output))?;
     check_paths(&args.inputs, &args.outputs, args.report.as_deref())?;
@@ -87,10 +93,12 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let mut voxels = voxels?;
     stages.allocate = allocate_ms;
 
+    let fill = Fill::from(args.method.fill);
     let task = Task {
         mesh: &loaded,
         lattice: &lattice,
         job: &job,
+        fill,
         repeat: args.repeat.get(),
         attributes: wanted.as_ref(),
         list_method: args.list_method.map(Into::into),
@@ -127,6 +135,12 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
     let triangles = loaded.triangles.len();
     drop(loaded);
 
+    if let Some(FillReport { questionable, uncorrected }) = ran.fill {
+        reporter.say(&format!(
+            "filled between slices ({fill}): {questionable} columns were questionable, {uncorrected} of them past correction; \
+             `trixel verify --mode solid` lists what differs from the exact solid"
+        ));
+    }
     let count = voxels.count();
     if count == 0 {
         reporter.warn(empty_hint(job.mode()));
@@ -164,6 +178,7 @@ pub(crate) fn run(mut args: VoxelizeArgs) -> Result<ExitCode> {
             grid: GridReport::from(job.grid()),
             mode: job.mode().name(),
             overlap: args.method.overlap,
+            fill: FillRecord::new(&job, fill, ran.fill),
             backend: ran.backend,
             strategy: ran.strategy.name(),
             threads: rayon::current_num_threads(),
@@ -244,6 +259,9 @@ pub(crate) fn set_threads(threads: Option<u32>) -> Result<()> {
 pub(crate) fn check_method(method: &MethodArgs) {
     if method.overlap != 0.0 && Mode::from(method.mode) != Mode::Sliced {
         usage("--overlap only means something with --mode sliced");
+    }
+    if Fill::from(method.fill) != Fill::Parity && Mode::from(method.mode) != Mode::Solid {
+        usage("--fill only means something with --mode solid");
     }
     Engine::check(method);
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
+use trixel::fill::Fill;
 use trixel::{BrickMap, Bytes, CpuBackend, Job, Occupancy, Strategy, Volume};
 use trixel_io::VolumeFormat;
 use trixel_io::atomic_file::Staged;
@@ -21,11 +22,13 @@ pub(crate) enum Voxels {
 
 impl Voxels {
     /// Empty, and bricks if `--sparse` asks for them or the dense grid would not fit the memory, and every output takes
-    /// them. A GPU that was asked for and attributes want dense ones.
+    /// them. A GPU that was asked for, attributes and fills want dense ones.
     pub(crate) fn allocate(args: &VoxelizeArgs, engine: &Engine, job: &Job) -> Result<Self> {
         let takes_bricks = |path: &Path| VolumeFormat::from_path(path).is_some_and(VolumeFormat::takes_bricks);
         let dense_only = args.outputs.iter().find(|path| !takes_bricks(path));
-        let bricks_will_do = engine.cpu_may_compute() && args.attributes.attributes.is_empty();
+        let bricks_will_do = engine.cpu_may_compute()
+            && args.attributes.attributes.is_empty()
+            && Fill::from(args.method.fill) == Fill::Parity;
         let available = memory::available_for_voxels();
         let needed = Volume::required_bytes(job.grid());
         let fits = available.is_none_or(|available| needed <= available);

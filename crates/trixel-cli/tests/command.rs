@@ -393,6 +393,40 @@ fn contradicting_gpu_arguments_are_refused() {
     }
 }
 
+#[test]
+fn light_is_rendered_and_compared_and_filmed() {
+    let bench = Bench::new();
+    let small = "--size 24x18 -r 16 --samples 1";
+    bench.ok(&format!("render scene:torus:24 --effect refraction --reference {small} -o traced.png"));
+    let said = bench.ok(&format!(
+        "render scene:torus:24 --effect refraction --adapter llvmpipe {small} -o lit.png --compare traced.png"
+    ));
+    let decibels: f64 = said.stderr.split("traced.png: ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!(decibels > 15.0, "{}", said.stderr);
+
+    let film = format!("animate scene:glass-ball:4 --frames 3 --seconds 0.5 --adapter llvmpipe {small}");
+    bench.ok(&format!("{film} -o film.gif --report r.json"));
+    assert!(std::fs::read(bench.path("film.gif")).unwrap().starts_with(b"GIF89a"));
+    let report = bench.json("r.json");
+    assert_eq!((report["frames_ms"].as_array().unwrap().len(), &report["seconds"]), (3, &0.5.into()));
+    bench.ok(&format!("{film} -o frames/"));
+    bench.ok(&format!("{film} -o film.apng"));
+    assert_eq!(std::fs::read_dir(bench.path("frames")).unwrap().count(), 3);
+
+    for (status, arguments, words) in [
+        (1, "render scene:torus -o a.jpg", ["a.jpg", ".png"]),
+        (1, "render scene:glass-ball --material wood=1.5 -o a.png", ["wood", "`amber`"]),
+        (2, "render scene:torus --material 0 -o a.png", ["refraction index", "0.1"]),
+        (1, "render scene:torus --environment none.hdr -o a.png", ["none.hdr", "sky, white, black"]),
+        (1, "animate scene:torus -o a.mp4", ["a.mp4", ".gif"]),
+        (1, "animate scene:torus --animation run -o b/", ["run", "no animation"]),
+        (2, "animate scene:torus --seconds 0 -o a.gif", ["0.02", "600"]),
+        (1, "animate scene:torus --adapter no-such-gpu -o c/", ["no-such-gpu", "there are"]),
+    ] {
+        bench.fails(status, arguments, &words);
+    }
+}
+
 /// A square of two materials, one with a texture that is not there.
 fn square(bench: &Bench) {
     bench.write(
@@ -562,6 +596,56 @@ fn a_killed_run_is_resumed_and_gives_the_identical_result() {
     }
     assert!(!bench.path("killed.zarr.partial").exists());
     assert!(files_of(&bench.path("killed.zarr")) == files_of(&bench.path("whole.zarr")));
+}
+
+#[test]
+fn slices_by_both_strategies() {
+    let bench = Bench::new();
+    bench.ok("voxelize scene:torus:24 -r 30 --mode sliced --overlap 0.25 -q -o cpu.npz");
+    for strategy in ["sliced", "slice-per-pass"] {
+        let asked = format!("--mode sliced --overlap 0.25 --strategy {strategy} --adapter llvmpipe");
+        bench.ok(&format!("voxelize scene:torus:24 -r 30 {asked} -q -o gpu.npz --report r.json"));
+        bench.ok("verify gpu.npz scene:torus:24 --mode sliced --overlap 0.25");
+        let report: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("r.json")).unwrap()).unwrap();
+        assert_eq!((&report["strategy"], &report["fill"]), (&strategy.into(), &serde_json::Value::Null));
+    }
+    let refused = "voxelize scene:cube -o a.npz --strategy sliced";
+    bench.fails(2, refused, &["--strategy sliced", "--mode sliced", "conservative"]);
+}
+
+#[test]
+fn solids_are_filled_in_three_ways() {
+    let bench = Bench::new();
+    for fill in ["parity", "xor", "march"] {
+        let arguments = format!("scene:torus:24 -r 40 --mode solid --fill {fill} -q");
+        bench.ok(&format!("voxelize {arguments} -o cpu-{fill}.npz --report r.json"));
+        bench.ok(&format!("voxelize {arguments} --adapter llvmpipe -o gpu-{fill}.npz"));
+        let verify = format!("verify gpu-{fill}.npz scene:torus:24 --mode solid");
+        bench.ok(&format!("{verify} --fill {fill}"));
+        // Against the exact solid only one is right.
+        let ran = bench.run(&format!("{verify} --list 1"));
+        assert_eq!(ran.stdout.contains(": equal"), fill == "parity", "{}", ran.stdout);
+        let report: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("r.json")).unwrap()).unwrap();
+        assert_eq!(report["fill"]["name"], fill);
+        assert_eq!(report["fill"]["uncorrected_columns"].is_null(), fill == "parity");
+    }
+    bench.fails(2, "voxelize scene:cube -o a.npz --fill xor", &["--fill", "--mode solid"]);
+    bench.fails(2, "voxelize scene:cube -o a.zarr --mode solid --fill xor", &["--fill", ".zarr"]);
+    bench.ok("voxelize scene:cube -r 20 -o sparse.npz --sparse --mode solid --fill march");
+}
+
+#[test]
+fn bench_compares_slicing_and_fills() {
+    let bench = Bench::new();
+    let ran = bench.ok("bench --table cl scene:torus:12 -r 16 --adapter llvmpipe --repeat 1 --html r.html");
+    for said in ["mode sliced", "slice-per-pass  ratio", "HD5850", "1282", "53.8"] {
+        assert!(ran.stdout.contains(said), "no {said} in {}", ran.stdout);
+    }
+    assert!(std::fs::read_to_string(bench.path("r.html")).unwrap().contains("HD5850"));
+    let ran = bench.ok("bench --table fills scene:torus -r 20,45");
+    assert_eq!(ran.stdout.lines().filter(|line| line.starts_with("torus")).count(), 16, "{}", ran.stdout);
+    bench.fails(2, "bench --table fills --json r.json", &["--table fills", "--json"]);
+    bench.fails(2, "bench scene:cube --strategy sliced", &["sliced", "conservative"]);
 }
 
 #[test]

@@ -103,6 +103,17 @@ pub enum GpuError {
     /// The strategy is not one of the GPU's.
     #[error("the gpu backend has no strategy `{0}`")]
     Strategy(trixel::Strategy),
+    /// The strategy has not that mode.
+    #[error(
+        "strategy `{strategy}` is for mode {}, not for `{mode}`; choose another strategy or mode",
+        strategy.modes().iter().map(|mode| format!("`{mode}`")).collect::<Vec<_>>().join(", ")
+    )]
+    StrategyOfOtherModes {
+        /// The strategy.
+        strategy: trixel::Strategy,
+        /// The job's mode.
+        mode: trixel::Mode,
+    },
     /// A grid whose single plane of voxels does not fit a binding.
     #[error(
         "one plane of the grid takes {needed} bytes, and {adapter} binds {limit} at most; choose a coarser grid, or use the \
@@ -167,6 +178,15 @@ pub enum GpuError {
         /// Those there was room for.
         room: u32,
     },
+    /// A strategy whose fragments claim no voxels.
+    #[error(
+        "strategy `{0}` writes no 3D textures itself; use `sliced` or `slice-per-pass`, or make them from its voxels with \
+         `MaterialVolume::from_attributes`"
+    )]
+    NoClaims(trixel::Strategy),
+    /// More copies of triangles than 32 bits number the vertices of.
+    #[error("`sliced` would draw more than 2^32 vertices for this mesh, grid and overlap; use `hybrid`")]
+    TooManySlices,
     /// The part of the mesh that the CPU does failed.
     #[error(transparent)]
     Cpu(#[from] trixel::Error),

@@ -212,12 +212,17 @@ impl Gpu {
         bytes: u64,
         usage: wgpu::BufferUsages,
     ) -> Result<wgpu::Buffer, GpuError> {
+        self.check_storage(label, bytes)?;
+        self.buffer(label, bytes, usage)
+    }
+
+    /// An error that says what does not fit one binding, if it does not.
+    pub(crate) fn check_storage(&self, what: &'static str, bytes: u64) -> Result<(), GpuError> {
         let limit = self.limits().binding_bytes;
         if bytes > limit {
-            let (adapter, what) = (self.info().to_string(), label);
-            return Err(GpuError::BindingTooSmall { adapter, what, needed: bytes, limit });
+            return Err(GpuError::BindingTooSmall { adapter: self.info().to_string(), what, needed: bytes, limit });
         }
-        self.buffer(label, bytes, usage)
+        Ok(())
     }
 
     /// A buffer with contents.

@@ -12,6 +12,7 @@ use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::limits::WORKGROUP;
 use crate::lists::SortKey;
+use crate::material_volume::Precision;
 use crate::shader::shader;
 
 /// A function of a shader, with the constants in front of it.
@@ -47,6 +48,17 @@ pub(crate) enum Kernel {
     GatherPairs(Recipe),
     WriteFragmentRows(Recipe),
     CopyCounts(Recipe),
+    /// Whether columns with an odd number of boundary voxels are filled as well.
+    SwitchColumns {
+        uncorrected: bool,
+    },
+    CorrectXor,
+    CorrectMarch,
+    /// To texels of a precision, with what is inside if it was filled.
+    ResolveClaims {
+        precision: Precision,
+        filled: bool,
+    },
 }
 
 impl Kernel {
@@ -85,8 +97,15 @@ impl Kernel {
             Self::MarchBricks,
             Self::CountBeforePlanes,
             Self::LocateFragments,
+            Self::SwitchColumns { uncorrected: false },
+            Self::SwitchColumns { uncorrected: true },
+            Self::CorrectXor,
+            Self::CorrectMarch,
         ];
-        others.into_iter().chain(sorting).chain(attributes).collect()
+        let resolving = Precision::ALL
+            .into_iter()
+            .flat_map(|precision| [false, true].map(|filled| Self::ResolveClaims { precision, filled }));
+        others.into_iter().chain(sorting).chain(attributes).chain(resolving).collect()
     }
 
     pub(crate) fn entry_point(self) -> &'static str {
@@ -117,6 +136,10 @@ impl Kernel {
             Self::GatherPairs(_) => "gather_pairs",
             Self::WriteFragmentRows(_) => "write_fragment_rows",
             Self::CopyCounts(_) => "copy_counts",
+            Self::SwitchColumns { .. } => "switch_columns",
+            Self::CorrectXor => "correct_xor",
+            Self::CorrectMarch => "correct_march",
+            Self::ResolveClaims { .. } => "resolve_claims",
         }
     }
 
@@ -158,12 +181,20 @@ impl Kernel {
                 "product_portable" "wide" "division" "numbering" "entry" "light" "surface" "nearest" "combine" "put_row"
                 "fragment_rows"
             ),
+            Self::SwitchColumns { .. } | Self::CorrectXor | Self::CorrectMarch => shader!("numbering" "fill_slices"),
+            Self::ResolveClaims { .. } => shader!("numbering" "resolve_claims"),
         }
     }
 
     /// The WGSL.
     pub(crate) fn source(self) -> String {
         let constants = match self {
+            Self::SwitchColumns { uncorrected } => format!("const UNCORRECTED: bool = {uncorrected};\n"),
+            Self::CorrectXor | Self::CorrectMarch => "const UNCORRECTED: bool = false;\n".to_owned(),
+            Self::ResolveClaims { precision, filled } => format!(
+                "alias Texels = texture_storage_3d<{}, write>;\nconst FILLED: bool = {filled};\n",
+                precision.wgsl_format()
+            ),
             Self::CountDigits(key) | Self::MoveEntries(key) => format!("const ORDER: u32 = {}u;\n", key.code()),
             Self::MarchBricks => format!("const ORDER: u32 = {}u;\n", SortKey::Voxels(VoxelOrder::Morton).code()),
             Self::Prioritize(recipe)
@@ -208,6 +239,7 @@ pub(crate) enum Bound<'a> {
     /// Words of a uniform.
     Words(&'a [u32]),
     Buffer(&'a wgpu::Buffer),
+    Texture(&'a wgpu::TextureView),
 }
 
 /// Records dispatches, one pass each, and submits them.
@@ -243,7 +275,7 @@ impl<'a> Dispatcher<'a> {
                     bytes.resize(bytes.len().next_multiple_of(16), 0);
                     self.gpu.buffer_with("trixel kernel parameters", &bytes, wgpu::BufferUsages::UNIFORM).map(Some)
                 }
-                Bound::Buffer(_) => Ok(None),
+                Bound::Buffer(_) | Bound::Texture(_) => Ok(None),
             })
             .collect::<Result<Vec<_>, GpuError>>()?;
         let gpu = self.gpu;
@@ -253,11 +285,12 @@ impl<'a> Dispatcher<'a> {
                 .iter()
                 .zip(&uniforms)
                 .filter_map(|((binding, bound), uniform)| {
-                    let buffer = match bound {
-                        Bound::Words(_) => uniform.as_ref()?,
-                        Bound::Buffer(buffer) => buffer,
+                    let resource = match bound {
+                        Bound::Words(_) => uniform.as_ref()?.as_entire_binding(),
+                        Bound::Buffer(buffer) => buffer.as_entire_binding(),
+                        Bound::Texture(view) => wgpu::BindingResource::TextureView(view),
                     };
-                    Some(wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() })
+                    Some(wgpu::BindGroupEntry { binding: *binding, resource })
                 })
                 .collect();
             let layout = pipeline.get_bind_group_layout(0);

@@ -26,7 +26,7 @@ struct Params {
     first_column: u32,
     max_columns: u32,
     cutoff: f32,
-    unused: u32,
+    first_triangle: u32,
     window: [u32; 2],
     window_size: [f32; 2],
 }
@@ -128,14 +128,16 @@ impl<'a> Layout<'a> {
                 first_column: 0,
                 max_columns,
                 cutoff: cutoff.value,
-                unused: 0,
+                first_triangle: 0,
                 window: [0; 2],
                 #[expect(clippy::cast_precision_loss, reason = "at most 8192")]
                 window_size: [target_size as f32; 2],
             };
             let mut chunks = vec![];
+            let mut first_triangle = 0;
             for chunk in &mesh.chunks {
-                let params = Params { triangles: chunk.triangles, ..base };
+                let params = Params { triangles: chunk.triangles, first_triangle, ..base };
+                first_triangle += chunk.triangles;
                 let parameters = sets.push(&params);
                 let later_shares: Vec<u32> = (0..most)
                     .step_by(max_columns as usize)

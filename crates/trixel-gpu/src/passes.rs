@@ -14,8 +14,8 @@ use crate::layout::{Layout, Part, Unit};
 use crate::limits::WORKGROUP;
 use crate::mesh::GpuMesh;
 use crate::pipelines::bind;
-use crate::scratch::{List, Lists, Scratch, Status};
-use crate::shader::{Raster, Stage, Variant};
+use crate::scratch::{List, Lists, ScanBuffers, Scratch, Status};
+use crate::shader::{Drawn, Raster, Stage, Variant};
 use crate::timer::Timer;
 use crate::volume::{GpuVolume, Slab};
 use crate::voxelizer::Classification;
@@ -67,6 +67,8 @@ pub(crate) fn record(
                 (Strategy::Balanced, _) => recorder.balanced(unit)?,
                 (Strategy::CaseSorted, _) => recorder.case_sorted(unit)?,
                 (Strategy::Tiled, _) => recorder.tiled(part.slab, unit)?,
+                (Strategy::Sliced, _) => recorder.sliced(unit)?,
+                (Strategy::SlicePerPass, _) => recorder.slice_per_pass(unit)?,
                 _ => recorder.triangle_parallel(unit)?,
             }
         }
@@ -226,14 +228,73 @@ impl<'a> Recorder<'a> {
 
     /// Rasterizes the triangles of a list, or all of them.
     fn fragment_parallel(&mut self, unit: &Unit<'_>, list: Option<&List>) -> Result<(), GpuError> {
-        let Setting { gpu, dilation, variant, .. } = self.setting;
-        let pipeline = gpu.pipelines().raster(gpu, Raster { listed: list.is_some(), dilation }, variant);
-        let target = self.setting.scratch.target(gpu, self.target_size)?;
+        let Setting { gpu, dilation, .. } = self.setting;
         let triangles = list.map_or(&self.setting.scratch.nothing, |list| &list.triangles);
         let group = bind(gpu, &gpu.pipelines().layouts().list_draw, &[triangles.as_entire_binding()]);
+        let drawn = if list.is_some() { Drawn::Listed } else { Drawn::All };
+        let vertices = unit.chunk.triangles * dilation.vertices();
+        self.rasterize(unit, drawn, "fragment-parallel", |pass| {
+            pass.set_bind_group(1, &group, &[]);
+            match list {
+                Some(list) => pass.draw_indirect(&list.arguments, 0),
+                None => pass.draw(0..vertices, 0..1),
+            }
+        })
+    }
+
+    /// \[CL\] 2.2, with a prefix sum in place of the geometry shader.
+    fn sliced(&mut self, unit: &Unit<'_>) -> Result<(), GpuError> {
+        let Setting { gpu, dilation, .. } = self.setting;
+        let scan = self.count_and_scan(unit, Stage::CountSlices, dilation.vertices())?;
+        let group = bind(gpu, &gpu.pipelines().layouts().list_draw, &[scan.counted().as_entire_binding()]);
+        self.rasterize(unit, Drawn::Slices, "sliced", |pass| {
+            pass.set_bind_group(1, &group, &[]);
+            pass.draw_indirect(&scan.arguments, 0);
+        })
+    }
+
+    /// Llamas 2007. The draws share a render pass, because nothing is rendered into it.
+    fn slice_per_pass(&mut self, unit: &Unit<'_>) -> Result<(), GpuError> {
+        let Setting { gpu, dilation, job, .. } = self.setting;
+        let slices = job.grid().dims()[2];
+        let stride = gpu.limits().parameter_stride;
+        let bytes: Vec<u8> = (0..slices)
+            .flat_map(|slice| {
+                let mut slot = slice.to_le_bytes().to_vec();
+                slot.resize(stride as usize, 0);
+                slot
+            })
+            .collect();
+        let buffer = gpu.buffer_with("trixel slices", &bytes, wgpu::BufferUsages::UNIFORM)?;
+        let one = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: &buffer,
+            offset: 0,
+            size: wgpu::BufferSize::new(4),
+        });
+        let group = bind(gpu, &gpu.pipelines().layouts().slice_draw, &[one]);
+        let vertices = unit.chunk.triangles * dilation.vertices();
+        self.rasterize(unit, Drawn::Slice, "slice-per-pass", |pass| {
+            for slice in 0..slices {
+                pass.set_bind_group(1, &group, &[slice * stride]);
+                pass.draw(0..vertices, 0..1);
+            }
+        })
+    }
+
+    /// A render pass for each window of the raster target, in which `draw` binds group 1 and draws.
+    fn rasterize(
+        &mut self,
+        unit: &Unit<'_>,
+        drawn: Drawn,
+        name: &'static str,
+        draw: impl Fn(&mut wgpu::RenderPass<'_>),
+    ) -> Result<(), GpuError> {
+        let Setting { gpu, dilation, variant, .. } = self.setting;
+        let pipeline = gpu.pipelines().raster(gpu, Raster { drawn, dilation }, variant);
+        let target = self.setting.scratch.target(gpu, self.target_size)?;
         for window in &unit.windows {
             let mut pass = self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("fragment-parallel"),
+                label: Some(name),
                 color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                     view: &target,
                     depth_slice: None,
@@ -243,38 +304,45 @@ impl<'a> Recorder<'a> {
                         store: wgpu::StoreOp::Discard,
                     },
                 })],
-                timestamp_writes: self.setting.timer.as_mut().and_then(|timer| timer.render("fragment-parallel")),
+                timestamp_writes: self.setting.timer.as_mut().and_then(|timer| timer.render(name)),
                 ..Default::default()
             });
             pass.set_pipeline(&pipeline);
             pass.set_bind_group(0, &unit.bind_group, &[*window]);
-            pass.set_bind_group(1, &group, &[]);
             if let Some(group) = &self.append_group {
                 pass.set_bind_group(2, group, &[]);
             }
-            match list {
-                Some(list) => pass.draw_indirect(&list.arguments, 0),
-                None => pass.draw(0..unit.chunk.triangles * dilation.vertices(), 0..1),
-            }
+            draw(&mut pass);
         }
         Ok(())
     }
 
     fn balanced(&mut self, unit: &Unit<'_>) -> Result<(), GpuError> {
+        let scan = self.count_and_scan(unit, Stage::CountColumns, 0)?;
+        let layouts = self.setting.gpu.pipelines().layouts();
+        let pairs = [scan.counted(), &scan.total].map(wgpu::Buffer::as_entire_binding);
+        let pairs = bind(self.setting.gpu, &layouts.list_read, &pairs);
+        let main = self.pipeline(Stage::Balanced);
+        let mut pass = self.pass("balanced");
+        run_indirect(&mut pass, &main, &unit.bind_group, unit.parameters, &pairs, &scan.arguments);
+        Ok(())
+    }
+
+    /// The prefix sums of what `count` counts for each triangle, and the arguments of a draw of so many vertices for each
+    /// and of a dispatch.
+    fn count_and_scan(&mut self, unit: &Unit<'_>, count: Stage, vertices: u32) -> Result<ScanBuffers, GpuError> {
         let gpu = self.setting.gpu;
         let layouts = gpu.pipelines().layouts();
         let scan = self.setting.scratch.scan(gpu, self.capacity)?;
-        let columns = &scan.levels[0];
+        let columns = scan.counted();
         let triangles = unit.chunk.triangles;
 
         let sums = self.prefix_sums(&scan, triangles)?;
         let counted = bind(gpu, &layouts.columns, &[columns.as_entire_binding()]);
         let arguments = self.arguments_group(&scan.total, &scan.arguments);
-        let pairs = bind(gpu, &layouts.list_read, &[columns, &scan.total].map(wgpu::Buffer::as_entire_binding));
 
-        let count = self.pipeline(Stage::CountColumns);
-        let write_arguments = self.pipeline(Stage::Arguments { vertices: 0 });
-        let main = self.pipeline(Stage::Balanced);
+        let count = self.pipeline(count);
+        let write_arguments = self.pipeline(Stage::Arguments { vertices });
         let groups = self.groups(triangles);
 
         let mut pass = self.pass("count and scan");
@@ -282,12 +350,9 @@ impl<'a> Recorder<'a> {
         sums.record(&mut pass);
         run(&mut pass, &write_arguments, &arguments, None, None, [1, 1]);
         drop(pass);
-        let mut pass = self.pass("balanced");
-        run_indirect(&mut pass, &main, &unit.bind_group, unit.parameters, &pairs, &scan.arguments);
-        drop(pass);
         let total = self.status.total_offset(unit.index);
         self.encoder.copy_buffer_to_buffer(&scan.total, 0, &self.status.buffer, total, 4);
-        Ok(())
+        Ok(scan)
     }
 
     fn fill(&mut self, part: &Part<'_>) {

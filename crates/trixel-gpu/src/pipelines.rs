@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::gpu::Gpu;
 use crate::kernel::Kernels;
-use crate::shader::{self, Raster, Sink, Stage, Variant};
+use crate::shader::{self, Drawn, Raster, Sink, Stage, Variant};
 
 /// Which shader stages see a binding, and how.
 #[derive(Clone, Copy)]
@@ -48,6 +48,7 @@ pub(crate) struct Layouts {
     pub(crate) list_write: wgpu::BindGroupLayout,
     pub(crate) list_read: wgpu::BindGroupLayout,
     pub(crate) list_draw: wgpu::BindGroupLayout,
+    pub(crate) slice_draw: wgpu::BindGroupLayout,
     pub(crate) classify: wgpu::BindGroupLayout,
     pub(crate) columns: wgpu::BindGroupLayout,
     pub(crate) expand: wgpu::BindGroupLayout,
@@ -77,6 +78,7 @@ impl Layouts {
             list_write: layout(device, &[write, write]),
             list_read: layout(device, &[read, read]),
             list_draw: layout(device, &[Slot::Read(VERTEX)]),
+            slice_draw: layout(device, &[Slot::Parameters]),
             classify: layout(device, &[write, write, write, write]),
             columns: layout(device, &[write]),
             expand: layout(device, &[Slot::Parameters, read, write]),
@@ -96,7 +98,7 @@ impl Layouts {
             Stage::TriangleParallel { .. } | Stage::ClassifyCases => Some(&self.list_write),
             Stage::TriangleList { .. } | Stage::Balanced | Stage::Tiled => Some(&self.list_read),
             Stage::Classify { .. } => Some(&self.classify),
-            Stage::CountColumns | Stage::CountTiles => Some(&self.columns),
+            Stage::CountColumns | Stage::CountSlices | Stage::CountTiles => Some(&self.columns),
             Stage::SortCases | Stage::CaseSizes => Some(&self.cases),
             Stage::CaseSorted(_) => Some(&self.case_sorted),
             Stage::PairTiles => Some(&self.pair_tiles),
@@ -202,9 +204,14 @@ impl Pipelines {
     /// The pipeline of the rasterizer. Errors go to the device's error scopes.
     pub(crate) fn raster(&self, gpu: &Gpu, raster: Raster, variant: Variant) -> wgpu::RenderPipeline {
         keep(&self.raster, (raster, variant), || {
-            let label = Some(Raster::FRAGMENT_ENTRY_POINT);
+            let [vertex, fragment] = raster.entry_points();
+            let label = Some(fragment);
             let source = shader::raster_source(raster, variant, gpu.info().tier);
-            let layouts = [&self.layouts.common, &self.layouts.list_draw, &self.layouts.append].map(Some);
+            let drawn = match raster.drawn {
+                Drawn::All | Drawn::Listed | Drawn::Slices => &self.layouts.list_draw,
+                Drawn::Slice => &self.layouts.slice_draw,
+            };
+            let layouts = [&self.layouts.common, drawn, &self.layouts.append].map(Some);
             let groups = if variant.sink == Sink::Bits { &layouts[..2] } else { &layouts };
             let (module, layout) = module_and_layout(gpu.device(), label, source, groups);
             gpu.device().create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -212,7 +219,7 @@ impl Pipelines {
                 layout: Some(&layout),
                 vertex: wgpu::VertexState {
                     module: &module,
-                    entry_point: Some(Raster::VERTEX_ENTRY_POINT),
+                    entry_point: Some(vertex),
                     compilation_options: wgpu::PipelineCompilationOptions::default(),
                     buffers: &[],
                 },

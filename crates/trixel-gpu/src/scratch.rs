@@ -146,6 +146,12 @@ impl ScanBuffers {
         }
         Ok(Self { levels, total: level(1)?, arguments: arguments(gpu)? })
     }
+
+    /// The first level: what is counted, then its prefix sums.
+    pub(crate) fn counted(&self) -> &wgpu::Buffer {
+        // There is always one; the total is only named for the type's sake.
+        self.levels.first().unwrap_or(&self.total)
+    }
 }
 
 impl CaseBuffers {

@@ -25,6 +25,8 @@ pub(crate) enum Stage {
     CountColumns,
     /// One invocation a pair of triangle and column.
     Balanced,
+    /// The number of slices that each triangle may meet.
+    CountSlices,
     /// Parity upwards.
     Fill,
     /// Bits to bytes.
@@ -101,6 +103,7 @@ impl Stage {
             Self::Classify { .. } => "classify",
             Self::CountColumns => "count_columns",
             Self::Balanced => "balanced",
+            Self::CountSlices => "count_slices",
             Self::Fill => "fill",
             Self::Expand => "expand",
             Self::ScanBlocks => "scan_blocks",
@@ -130,6 +133,7 @@ impl Stage {
             | Self::Tiled => true,
             Self::Classify { .. }
             | Self::CountColumns
+            | Self::CountSlices
             | Self::Expand
             | Self::ScanBlocks
             | Self::AddTotals
@@ -159,8 +163,11 @@ impl Stage {
             Self::Classify { .. } => shader!("wide" "common" "triangle" "size" "look" "counters" "classify"),
             Self::CountColumns => shader!("wide" "common" "triangle" "look" "counters" "count_columns"),
             Self::Balanced => shader!(
-                "wide" "common" "triangle" "column" "voxels" "runs" "direct" "counters" "lanes" "pairs" "balanced"
+                "wide" "common" "triangle" "column" "voxels" "runs" "direct" "counters" "lanes" "pair" "balanced"
             ),
+            Self::CountSlices => {
+                shader!("wide" "common" "triangle" "look" "counters" "slices_of" "count_slices")
+            }
             Self::Fill => shader!("common" "fill"),
             Self::Expand => shader!("expand"),
             Self::ScanBlocks | Self::AddTotals => shader!("scan"),
@@ -175,7 +182,7 @@ impl Stage {
                 shader!("wide" "common" "triangle" "look" "counters" "tiles" "triangle_tiles" "count_tiles")
             }
             Self::PairTiles => {
-                shader!("wide" "common" "triangle" "counters" "tiles" "triangle_tiles" "pairs" "pair_tiles")
+                shader!("wide" "common" "triangle" "counters" "tiles" "triangle_tiles" "pair" "pair_tiles")
             }
             Self::CountDigits | Self::MoveEntries => shader!("numbering" "tile_key" "radix_sort"),
             Self::FindTiles => shader!("numbering" "find_tiles"),
@@ -186,18 +193,49 @@ impl Stage {
     }
 }
 
-/// The rasterizer, over all triangles or a list of them.
+/// The rasterizer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Raster {
-    pub(crate) listed: bool,
+    pub(crate) drawn: Drawn,
     pub(crate) dilation: Dilation,
 }
 
+/// What the rasterizer draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Drawn {
+    /// All triangles.
+    All,
+    /// Those of a list.
+    Listed,
+    /// Each triangle once for each slice that it may meet.
+    Slices,
+    /// All triangles, in one slice.
+    Slice,
+}
+
 impl Raster {
-    pub(crate) const VERTEX_ENTRY_POINT: &str = "dilate";
-    pub(crate) const FRAGMENT_ENTRY_POINT: &str = "fragment_parallel";
-    const FILES: &[&str] =
-        shader!("wide" "common" "triangle" "column" "voxels" "runs" "direct" "counters" "fragment_parallel");
+    /// The functions of the vertex and the fragment stage.
+    pub(crate) fn entry_points(self) -> [&'static str; 2] {
+        match self.drawn {
+            Drawn::All | Drawn::Listed => ["dilate", "fragment_parallel"],
+            Drawn::Slices => ["sliced", "slice"],
+            Drawn::Slice => ["slice_per_pass", "slice"],
+        }
+    }
+
+    fn files(self) -> &'static [&'static str] {
+        match self.drawn {
+            Drawn::All | Drawn::Listed => {
+                shader!("wide" "common" "triangle" "column" "voxels" "runs" "direct" "counters" "dilate" "fragment_parallel")
+            }
+            Drawn::Slices => shader!(
+                "wide" "common" "triangle" "column" "voxels" "runs" "direct" "counters" "dilate" "slices_of" "slice" "pair" "sliced"
+            ),
+            Drawn::Slice => shader!(
+                "wide" "common" "triangle" "column" "voxels" "runs" "direct" "counters" "dilate" "slices_of" "slice" "slice_per_pass"
+            ),
+        }
+    }
 }
 
 /// What a pipeline is specialized for.
@@ -217,6 +255,8 @@ pub(crate) enum Sink {
     List,
     /// To a list alone, once for every triangle.
     Fragments,
+    /// To the bits, and to a buffer that knows the lowest triangle of each voxel; strategies of slices alone do that.
+    Claims,
     /// To a list alone, with the triangle.
     Pairs,
     /// Likewise the voxels whose doubled cubes a triangle meets, whatever the mode.
@@ -226,7 +266,7 @@ pub(crate) enum Sink {
 impl Sink {
     fn code(self) -> u32 {
         match self {
-            Self::Bits => 0,
+            Self::Bits | Self::Claims => 0,
             Self::List => 1,
             Self::Fragments => 2,
             Self::Pairs | Self::Shell => 3,
@@ -235,13 +275,13 @@ impl Sink {
 
     /// Whether the bits are looked at.
     pub(crate) fn has_bits(self) -> bool {
-        matches!(self, Self::Bits | Self::List)
+        matches!(self, Self::Bits | Self::List | Self::Claims)
     }
 
     /// Words of an entry of the list.
     pub(crate) fn entry_words(self) -> usize {
         match self {
-            Self::Bits => 0,
+            Self::Bits | Self::Claims => 0,
             Self::List | Self::Fragments => 2,
             Self::Pairs | Self::Shell => 3,
         }
@@ -249,10 +289,14 @@ impl Sink {
 
     fn files(self) -> &'static [&'static str] {
         match self {
-            Self::Bits => shader!("entry" "no_append"),
+            Self::Bits | Self::Claims => shader!("entry" "no_append"),
             Self::List | Self::Fragments => shader!("entry" "append"),
             Self::Pairs | Self::Shell => shader!("entry" "append_pairs"),
         }
+    }
+
+    fn claiming_files(self) -> &'static [&'static str] {
+        if self == Self::Claims { shader!("claim") } else { shader!("no_claim") }
     }
 }
 
@@ -292,7 +336,7 @@ pub(crate) fn source(stage: Stage, variant: Variant, tier: Tier, max_groups: u32
         Stage::Classify { heuristic } => constants += &format!("const HEURISTIC: u32 = {}u;\n", heuristic.code()),
         Stage::Arguments { vertices } => {
             constants += &format!("const VERTICES: u32 = {vertices}u;\nconst MAX_GROUPS: u32 = {max_groups}u;\n");
-            constants += &format!("const MAX_PAIRS: u32 = {MAX_PAIRS}u;\n");
+            constants += &format!("const MAX_PAIRS: u32 = {}u;\n", MAX_PAIRS / vertices.max(1));
         }
         _ => {}
     }
@@ -306,10 +350,14 @@ fn front(small: bool, flat: bool, tiled: bool) -> String {
 
 /// The WGSL of a vertex and a fragment stage.
 pub(crate) fn raster_source(raster: Raster, variant: Variant, tier: Tier) -> String {
-    let (listed, dilation) = (raster.listed, raster.dilation.code());
+    let (listed, dilation) = (raster.drawn == Drawn::Listed, raster.dilation.code());
     let constants =
         front(false, false, false) + &format!("const LISTED: bool = {listed};\nconst DILATION: u32 = {dilation}u;\n");
-    assemble(variant, tier, &constants, Raster::FILES, true)
+    let claiming = match raster.drawn {
+        Drawn::All | Drawn::Listed => &[],
+        Drawn::Slices | Drawn::Slice => variant.sink.claiming_files(),
+    };
+    assemble(variant, tier, &constants, &[raster.files(), claiming].concat(), true)
 }
 
 /// `writes` says whether voxels are written.
@@ -344,7 +392,7 @@ mod tests {
     use super::*;
     use crate::kernel::Kernel;
 
-    const SINKS: [Sink; 6] = [Sink::Bits, Sink::List, Sink::Fragments, Sink::Pairs, Sink::Shell, Sink::Bits];
+    const SINKS: [Sink; 6] = [Sink::Bits, Sink::List, Sink::Fragments, Sink::Pairs, Sink::Shell, Sink::Claims];
 
     /// Every mode with every sink, half of them counting.
     const VARIANTS: [Variant; 24] = {
@@ -381,6 +429,7 @@ mod tests {
             Stage::TriangleList { small: true },
             Stage::CountColumns,
             Stage::Balanced,
+            Stage::CountSlices,
             Stage::Fill,
             Stage::Expand,
             Stage::ScanBlocks,
@@ -420,11 +469,11 @@ mod tests {
     #[test]
     fn every_raster_stage_is_valid() {
         for dilation in Dilation::ALL {
-            for listed in [false, true] {
+            for drawn in [Drawn::All, Drawn::Listed, Drawn::Slices, Drawn::Slice] {
                 for variant in VARIANTS {
                     for tier in Tier::ALL {
-                        let source = raster_source(Raster { listed, dilation }, variant, tier);
-                        assert_valid(&source, tier, &[Raster::VERTEX_ENTRY_POINT, Raster::FRAGMENT_ENTRY_POINT]);
+                        let raster = Raster { drawn, dilation };
+                        assert_valid(&raster_source(raster, variant, tier), tier, &raster.entry_points());
                     }
                 }
             }

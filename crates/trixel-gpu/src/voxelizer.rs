@@ -19,7 +19,7 @@ use crate::timer::{PassTime, Timer};
 use crate::volume::GpuVolume;
 
 /// The strategies of this backend.
-pub const STRATEGIES: [Strategy; 7] = [
+pub const STRATEGIES: [Strategy; 9] = [
     Strategy::TriangleParallel,
     Strategy::FragmentParallel,
     Strategy::Hybrid,
@@ -27,7 +27,14 @@ pub const STRATEGIES: [Strategy; 7] = [
     Strategy::Balanced,
     Strategy::CaseSorted,
     Strategy::Tiled,
+    Strategy::Sliced,
+    Strategy::SlicePerPass,
 ];
+
+/// The strategies of this backend that have a mode.
+pub fn strategies_of(mode: Mode) -> impl Iterator<Item = Strategy> {
+    STRATEGIES.into_iter().filter(move |strategy| strategy.modes().contains(&mode))
+}
 
 /// How to voxelize; nothing here changes which voxels are set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -106,6 +113,9 @@ impl Voxelizer {
             strategy if STRATEGIES.contains(&strategy) => strategy,
             other => return Err(GpuError::Strategy(other)),
         };
+        if !strategy.modes().contains(&job.mode()) {
+            return Err(GpuError::StrategyOfOtherModes { strategy, mode: job.mode() });
+        }
         Ok(Self {
             gpu: gpu.clone(),
             job: *job,
@@ -372,8 +382,12 @@ impl Voxelizer {
         if too_large > 0 {
             return Err(GpuError::TrianglesTooLarge(too_large));
         }
+        let (most, error) = match self.strategy {
+            Strategy::Sliced => (MAX_PAIRS / self.dilation.vertices(), GpuError::TooManySlices),
+            _ => (MAX_PAIRS, GpuError::TooManyColumns),
+        };
         match totals.iter().max() {
-            Some(needed) if *needed > MAX_PAIRS => return Err(GpuError::TooManyColumns),
+            Some(needed) if *needed > most => return Err(error),
             Some(&needed) if needed > status.room => {
                 return Err(GpuError::TooManyTiles { needed, room: status.room });
             }

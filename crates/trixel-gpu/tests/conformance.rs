@@ -7,7 +7,7 @@
 use std::sync::LazyLock;
 
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, Error, Job, Strategy, Volume};
+use trixel::{Backend, Error, Job, Mode, Strategy, Volume};
 use trixel_gpu::{AdapterChoice, Cutoff, Dilation, Gpu, GpuBackend, Heuristic, Options};
 
 fn open(name: &str) -> Gpu {
@@ -30,6 +30,10 @@ impl Backend for One {
 
     fn strategies(&self) -> &'static [Strategy] {
         self.backend.strategies()
+    }
+
+    fn modes(&self) -> &'static [Mode] {
+        self.strategy.modes()
     }
 
     fn voxelize(&self, mesh: &LatticeMesh<'_>, job: &Job, volume: &mut Volume) -> Result<Strategy, Error> {
@@ -55,6 +59,11 @@ fn dilated(gpu: &Gpu, dilation: Dilation) -> One {
     one(gpu, Strategy::FragmentParallel, Options { dilation, ..Options::default() })
 }
 
+/// Copies of many vertices each.
+fn sliced_hull(gpu: &Gpu) -> One {
+    one(gpu, Strategy::Sliced, Options { dilation: Dilation::HasselgrenHull, ..Options::default() })
+}
+
 mod lavapipe {
     use super::*;
 
@@ -67,6 +76,9 @@ mod lavapipe {
     trixel::conformance_suite!(batched balanced, plain(&LAVAPIPE, Strategy::Balanced));
     trixel::conformance_suite!(batched case_sorted, plain(&LAVAPIPE, Strategy::CaseSorted));
     trixel::conformance_suite!(batched tiled, plain(&LAVAPIPE, Strategy::Tiled));
+    trixel::conformance_suite!(sliced sliced, plain(&LAVAPIPE, Strategy::Sliced));
+    trixel::conformance_suite!(sliced sliced_hasselgren_hull, sliced_hull(&LAVAPIPE));
+    trixel::conformance_suite!(sliced slice_per_pass, plain(&LAVAPIPE, Strategy::SlicePerPass));
 }
 
 mod swiftshader {
@@ -81,4 +93,6 @@ mod swiftshader {
     trixel::conformance_suite!(batched balanced, plain(&SWIFTSHADER, Strategy::Balanced));
     trixel::conformance_suite!(batched case_sorted, plain(&SWIFTSHADER, Strategy::CaseSorted));
     trixel::conformance_suite!(batched tiled, plain(&SWIFTSHADER, Strategy::Tiled));
+    trixel::conformance_suite!(sliced sliced, plain(&SWIFTSHADER, Strategy::Sliced));
+    trixel::conformance_suite!(sliced slice_per_pass, plain(&SWIFTSHADER, Strategy::SlicePerPass));
 }

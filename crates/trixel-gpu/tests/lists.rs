@@ -6,7 +6,7 @@ use trixel::conformance::zoo;
 use trixel::lattice::LatticeMesh;
 use trixel::{Grid, Job, Mesh, Mode, Strategy, VoxelOrder, voxel_list};
 use trixel_gpu::{
-    AdapterChoice, Gpu, GpuError, GpuMesh, GpuVolume, GpuVoxelList, ListMethod, Options, STRATEGIES, Voxelizer, wgpu,
+    AdapterChoice, Gpu, GpuError, GpuMesh, GpuVolume, GpuVoxelList, ListMethod, Options, Voxelizer, strategies_of, wgpu,
 };
 
 const DRIVERS: [&str; 2] = ["llvmpipe", "SwiftShader"];
@@ -62,8 +62,10 @@ fn every_strategy_appends_the_same() {
     let mesh = trixel::scene::build("room:8").unwrap();
     let grid = Grid::fit(&mesh.bounds().unwrap(), 60).unwrap();
     let gpu = open("llvmpipe");
-    for strategy in STRATEGIES {
-        compare(&gpu, "room", &mesh, grid, strategy, &[Mode::Conservative]);
+    for mode in [Mode::Conservative, Mode::Sliced] {
+        for strategy in strategies_of(mode) {
+            compare(&gpu, "room", &mesh, grid, strategy, &[mode]);
+        }
     }
 }
 

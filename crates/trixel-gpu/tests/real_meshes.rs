@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use trixel::lattice::LatticeMesh;
 use trixel::{Backend, CpuBackend, Grid, Job, Mesh, Mode, Volume};
-use trixel_gpu::{AdapterChoice, Gpu, GpuMesh, GpuVolume, Options, STRATEGIES, Voxelizer};
+use trixel_gpu::{AdapterChoice, Gpu, GpuMesh, GpuVolume, Options, Voxelizer, strategies_of};
 
 const DRIVERS: [&str; 2] = ["llvmpipe", "SwiftShader"];
 const MESHES: [&str; 8] = [
@@ -39,7 +39,7 @@ fn compare(name: &str, mesh: &Mesh, resolution: u32, modes: &[Mode], gpus: &[Gpu
         for gpu in gpus {
             let on_gpu = GpuMesh::upload(gpu, &lattice).unwrap();
             let voxels = GpuVolume::new(gpu, grid).unwrap();
-            for strategy in STRATEGIES {
+            for strategy in strategies_of(mode) {
                 let job = Job::new(grid, mode).with_strategy(strategy);
                 Voxelizer::new(gpu, &job, &Options::default()).unwrap().run(&on_gpu, &voxels).unwrap();
                 voxels.download(gpu, &mut found).unwrap();

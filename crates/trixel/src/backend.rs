@@ -4,6 +4,7 @@ use crate::grid::GridError;
 use crate::job::{Job, JobError, Strategy};
 use crate::lattice::{LatticeError, LatticeMesh};
 use crate::mesh::{Mesh, MeshError};
+use crate::mode::Mode;
 use crate::volume::{Volume, VolumeError};
 
 /// Voxelizes on some device. Every backend gives the same voxels; the suite in [`crate::conformance`] checks that.
@@ -13,6 +14,11 @@ pub trait Backend {
 
     /// The strategies that it has, [`Strategy::Auto`] aside.
     fn strategies(&self) -> &'static [Strategy];
+
+    /// The modes that it has: all of them, unless it is bound to a strategy with fewer.
+    fn modes(&self) -> &'static [Mode] {
+        &Mode::ALL
+    }
 
     /// Overwrites `volume` with the voxels of `mesh`, which was snapped to the job's grid, and says which strategy it
     /// used.

@@ -45,11 +45,15 @@ pub enum Strategy {
     /// GPU: pairs of tile and triangle, sorted; one workgroup a tile, which blends in its own memory (Pantaleoni's VoxelPipe,
     /// 2011).
     Tiled,
+    /// GPU, [`Mode::Sliced`] alone: each triangle once for each slice that it may meet, all in one draw (\[CL\] 2.2).
+    Sliced,
+    /// GPU, [`Mode::Sliced`] alone: the whole mesh once for each slice (Llamas 2007).
+    SlicePerPass,
 }
 
 impl Strategy {
     /// Every strategy.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::Auto,
         Self::ColumnRuns,
         Self::TriangleParallel,
@@ -59,6 +63,8 @@ impl Strategy {
         Self::Balanced,
         Self::CaseSorted,
         Self::Tiled,
+        Self::Sliced,
+        Self::SlicePerPass,
     ];
 
     /// The name on the command line and in reports.
@@ -74,6 +80,17 @@ impl Strategy {
             Self::Balanced => "balanced",
             Self::CaseSorted => "case-sorted",
             Self::Tiled => "tiled",
+            Self::Sliced => "sliced",
+            Self::SlicePerPass => "slice-per-pass",
+        }
+    }
+
+    /// The modes that it can do.
+    #[must_use]
+    pub fn modes(self) -> &'static [Mode] {
+        match self {
+            Self::Sliced | Self::SlicePerPass => &[Mode::Sliced],
+            _ => &Mode::ALL,
         }
     }
 }

@@ -37,6 +37,7 @@ mod bricks;
 #[cfg(any(test, feature = "conformance"))]
 pub mod conformance;
 mod cpu;
+pub mod fill;
 mod frame;
 mod grid;
 mod job;

@@ -8,7 +8,7 @@ use trixel::Mode;
 use crate::adapter::AdapterChoice;
 use crate::cutoff::Dilation;
 use crate::gpu::Gpu;
-use crate::shader::{Raster, Sink, Variant, raster_source};
+use crate::shader::{Drawn, Raster, Sink, Variant, raster_source};
 
 /// Pixels along a side: one row of the copy is 256 bytes times four.
 const SIZE: u32 = 64;
@@ -46,7 +46,7 @@ fn show_weights(w: Weighted) -> @location(0) vec4<f32> {
 /// Draws a triangle in voxels of the plane z = 3, and gives red, green and alpha of every pixel.
 fn drawn(gpu: &Gpu, triangle: [[f32; 2]; 3], dilation: Dilation) -> Vec<[f32; 4]> {
     let variant = Variant { mode: Mode::Conservative, counting: false, sink: Sink::Bits };
-    let raster = Raster { listed: false, dilation };
+    let raster = Raster { drawn: Drawn::All, dilation };
     let source = raster_source(raster, variant, gpu.info().tier) + STAGES;
     let device = gpu.device();
     let source = wgpu::ShaderSource::Wgsl(source.into());

@@ -31,6 +31,15 @@ impl Precision {
         }
     }
 
+    /// The same in WGSL.
+    pub(crate) fn wgsl_format(self) -> &'static str {
+        match self {
+            Self::Eight => "rgba8unorm",
+            Self::Half => "rgba16float",
+            Self::Full => "rgba32float",
+        }
+    }
+
     pub(crate) fn texel_bytes_u32(self) -> u32 {
         match self {
             Self::Eight => 4,

@@ -4,11 +4,14 @@
 //! texture holds a voxel, in a format of the application's choice, and lighting effects read it where it is.
 
 mod encoding;
+mod faces;
 mod from_attributes;
 mod medium;
+mod sliced;
 
 pub use encoding::{Decoding, Precision, VoxelMaterial};
 pub use medium::{Media, Medium};
+pub use sliced::Slicing;
 
 pub(crate) use encoding::Encoding;
 

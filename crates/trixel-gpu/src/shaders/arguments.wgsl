@@ -5,7 +5,7 @@
 
 @compute @workgroup_size(1)
 fn write_arguments() {
-    // Beyond this, invocations could not be numbered: nothing runs, and the caller sees why.
+    // Beyond this, invocations or vertices could not be numbered: nothing runs, and the caller sees why.
     let number = select(counted, 0u, counted > MAX_PAIRS);
     arguments[0] = number * VERTICES;
     arguments[1] = 1u;

@@ -1,5 +1,8 @@
 // One invocation a pair of triangle and column: the even distribution of work that [HCV] chapter 5 leaves for later.
 
+// How many pairs there are.
+@group(1) @binding(1) var<storage, read> total: u32;
+
 // The first invocation of each triangle in a workgroup makes it ready for the others.
 var<workgroup> ready: array<Triangle, WORKGROUP>;
 

@@ -30,7 +30,8 @@ struct Params {
     first_column: u32,
     max_columns: u32,
     cutoff: f32,
-    unused: u32,
+    // The number of this chunk's first triangle in the mesh.
+    first_triangle: u32,
     // The part of the projected slab that the raster target shows, in voxels from the slab's corner.
     window: vec2<i32>,
     window_size: vec2<f32>,

@@ -9,6 +9,8 @@ struct Round {
     none: u32,
 }
 
+// How many pairs there are.
+@group(1) @binding(1) var<storage, read> total: u32;
 @group(1) @binding(2) var<storage, read> round: Round;
 // Tile and triangle.
 @group(1) @binding(3) var<storage, read_write> pairs: array<vec2<u32>>;

@@ -42,6 +42,12 @@ macro_rules! conformance_suite {
             rival_openvdb_111_nested_shells
         );
     };
+    // The same for a backend that only has mode sliced.
+    (sliced $name:ident, $backend:expr) => {
+        $crate::conformance_suite!(@tests $name, $backend,
+            zoo_sliced random_in_cells solid_closed_soup huge_dims grid_is_overwritten other_grid_is_refused
+        );
+    };
     (@tests $name:ident, $backend:expr, $($check:ident)*) => {
         /// Conformance of one backend.
         #[cfg(test)]

@@ -119,7 +119,7 @@ fn random(backend: &dyn Backend, seed: u64, rounds: u32, placements: &[Placement
             for &extent in extents {
                 let triangle = random::triangle(&mut random, placement, -extent / 2, top - extent / 2, extent);
                 let mesh = lattice_mesh(&[triangle]);
-                for mode in Mode::ALL {
+                for &mode in backend.modes() {
                     compare(
                         backend,
                         &format!("round {round}, {placement:?} {triangle:?}"),
@@ -176,7 +176,7 @@ pub fn random_in_cells(backend: &dyn Backend) {
             let side = u32::try_from((along - 1) * pitch + extent / 2).unwrap_or(1);
             let cells = grid([1.0; 3], [1.0; 3], [side, side + 3, side - 1]);
             let mesh = lattice_mesh(&triangles);
-            for mode in Mode::ALL {
+            for &mode in backend.modes() {
                 let job = Job::new(cells, mode);
                 let job = if mode == Mode::Sliced { job.with_overlap(0.5) } else { Ok(job) };
                 match job {
@@ -194,7 +194,7 @@ pub fn random_far_outside(backend: &dyn Backend) {
     let grid = unit_grid([10, 11, 12]);
     for round in 0..300 {
         let triangle = random::triangle(&mut random, Placement::Anywhere, -40, 40, 30);
-        for mode in Mode::ALL {
+        for &mode in backend.modes() {
             compare(backend, &format!("round {round} {triangle:?}"), &lattice_mesh(&[triangle]), &Job::new(grid, mode));
         }
     }
@@ -225,7 +225,7 @@ pub fn solid_closed_soup(backend: &dyn Backend) {
     let triangles: Vec<_> =
         (0..3000).map(|i| random::triangle(&mut random, Placement::ALL[i % 5], -4, 60, [1, 3, 9, 40][i % 4])).collect();
     let mesh = lattice_mesh(&triangles);
-    for mode in Mode::ALL {
+    for &mode in backend.modes() {
         compare(backend, "soup", &mesh, &Job::new(unit_grid([61, 50, 67]), mode));
     }
 }
@@ -240,7 +240,7 @@ pub fn huge_dims(backend: &dyn Backend) {
         centre[axis] = far - 2.0;
         let near = zoo::octahedron([1.0, 1.5, 2.0], 1.2);
         let mesh = zoo::merged(&[near, zoo::octahedron(centre, 2.0)]);
-        for mode in Mode::ALL {
+        for &mode in backend.modes() {
             compare(backend, "octahedra at both ends", &mesh, &Job::new(unit_grid(dims), mode));
         }
     }
@@ -249,7 +249,7 @@ pub fn huge_dims(backend: &dyn Backend) {
 /// A volume that held other voxels before holds only the new ones after.
 pub fn grid_is_overwritten(backend: &dyn Backend) {
     let mesh = zoo::octahedron([6.5; 3], 5.0);
-    for mode in Mode::ALL {
+    for &mode in backend.modes() {
         let job = Job::new(unit_grid([13, 13, 13]), mode);
         let Ok(lattice) = LatticeMesh::snap(&mesh, job.grid()) else { panic!("snap") };
         let Ok(mut volume) = Volume::new(*job.grid()) else { panic!("volume") };
@@ -351,7 +351,7 @@ pub fn rival_trimesh_subdivision_misses(backend: &dyn Backend) {
 /// cuda_voxelizer issue 59: strides were wrong for unequal dimensions.
 pub fn rival_cuda_voxelizer_59_unequal_dims(backend: &dyn Backend) {
     let mesh = zoo::octahedron([9.0, 20.0, 35.0], 9.0);
-    for mode in Mode::ALL {
+    for &mode in backend.modes() {
         compare(backend, "unequal dims", &mesh, &Job::new(unit_grid([18, 41, 67]), mode));
     }
 }
@@ -359,7 +359,7 @@ pub fn rival_cuda_voxelizer_59_unequal_dims(backend: &dyn Backend) {
 /// OpenVDB issue 151: anisotropic voxels gave wrong results.
 pub fn rival_openvdb_151_anisotropic(backend: &dyn Backend) {
     let mesh = zoo::octahedron([0.0; 3], 1.0);
-    for mode in Mode::ALL {
+    for &mode in backend.modes() {
         let grid = grid([-1.0, -1.1, -1.2], [0.1, 0.05, 0.3], [20, 44, 8]);
         compare(backend, "anisotropic", &mesh, &Job::new(grid, mode));
     }

@@ -312,6 +312,42 @@ mod tests {
         assert_eq!(mesh.positions[0], [8.0, 0.0, 2.0]);
     }
 
+    /// Wrong joints or weights would tear the figure apart.
+    #[test]
+    fn a_real_figure_walks_without_tearing() {
+        let folder = std::env::var_os("TRIXEL_MODELS").map_or_else(
+            || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/models"),
+            Into::into,
+        );
+        let path = folder.join("cesium-man/CesiumMan.glb");
+        if !path.is_file() {
+            println!("{} is not there: left out", path.display());
+            return;
+        }
+        let model = crate::animation::read_animated(&path, &ReadOptions::default()).unwrap();
+        let mut mesh = model.mesh().clone();
+        let edges = |mesh: &trixel::Mesh| -> Vec<f64> {
+            let length = |[a, b]: [u32; 2]| {
+                let [a, b] = [a, b].map(|v| mesh.positions[v as usize]);
+                (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
+            };
+            mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]].map(length)).collect()
+        };
+        let rest = edges(&mesh);
+        assert_eq!(model.animations().len(), 1);
+        let mut moved = false;
+        for step in 0..8 {
+            model.pose(0, f64::from(step) / 4.0, &mut mesh);
+            let longest = edges(&mesh).iter().zip(&rest).map(|(now, then)| now - then).fold(0.0, f64::max);
+            assert!(longest < 0.1, "an edge of a figure 1.5 high grows by {longest}");
+            moved |= mesh.positions != model.mesh().positions;
+            let bounds = mesh.bounds().unwrap();
+            let height = (0..3).map(|axis| bounds.max[axis] - bounds.min[axis]).fold(0.0, f64::max);
+            assert!((1.3..1.7).contains(&height), "{height}");
+        }
+        assert!(moved);
+    }
+
     #[test]
     fn damaged_animations_are_named() {
         let problem = |change: fn(&mut serde_json::Value)| {

@@ -1,8 +1,7 @@
-// Pairs of a triangle and something that it has several of, numbered through by prefix sums.
+// Which triangle a pair of a triangle and one of its columns or slices belongs to.
 
-// For each triangle the pairs of those before it, and the number of all.
+// The prefix sums of the triangles' columns or slices.
 @group(1) @binding(0) var<storage, read> before: array<u32>;
-@group(1) @binding(1) var<storage, read> total: u32;
 
 // The last triangle whose pairs begin at or before this one; those without any are passed over.
 fn triangle_of_pair(pair: u32) -> u32 {
