@@ -222,9 +222,11 @@ mod tests {
         let bvh = Bvh::new(&mesh);
         let mut state = 7;
         let mut found = 0;
-        for _ in 0..300 {
-            let [origin, direction] =
-                [3.0, 1.0].map(|size| DVec3::from_array(std::array::from_fn(|_| size * random(&mut state))));
+        for aim in mesh.positions.iter().step_by(mesh.positions.len() / 300) {
+            let [origin, aside] =
+                [3.0, 0.1].map(|size| DVec3::from_array(std::array::from_fn(|_| size * random(&mut state))));
+            // Near something, or hardly any ray would hit the twigs.
+            let direction = DVec3::from_array(*aim) + aside - origin;
             let all = bvh.all(origin, direction);
             let tried: Vec<_> = mesh
                 .triangles
