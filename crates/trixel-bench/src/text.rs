@@ -8,7 +8,8 @@ use crate::published::{CL, CL_HARDWARE, CL_RESOLUTIONS, HCV, HCV_HARDWARE};
 use crate::results::{self, Results};
 
 /// Rows of cells under a head, each column as wide as it must be; the first is left-aligned.
-pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
+#[must_use]
+pub fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {
         rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max().unwrap_or(0)

@@ -16,7 +16,7 @@ use crate::mesh;
 use crate::progress::Reporter;
 use crate::render::{background, media, open, stage_png};
 use crate::render_args::AnimateArgs;
-use crate::report::AdapterReport;
+use crate::report::{AdapterReport, median};
 use crate::volume::cannot_write;
 
 /// Seconds of a film of what has no animation.
@@ -102,18 +102,18 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<ExitCode> {
     });
     let (mut staged, _folder) = written?;
 
-    let median = medians(&frames_ms);
+    let typical = medians(&frames_ms);
     reporter.say(&format!(
         "{} frames of {}; median of a frame: deformed in {:.1} ms, prepared in {:.1} ms, voxelized in {:.0} ms, filled in \
          {:.0} ms, lit in {:.0} ms, encoded in {:.0} ms on {}",
         args.frames,
         animation.map_or_else(|| input.to_owned(), |a| format!("animation `{}` ({:.2} s)", a.name, a.seconds)),
-        median.deform,
-        median.prepare,
-        median.voxelize,
-        median.fill,
-        median.light,
-        median.encode,
+        typical.deform,
+        typical.prepare,
+        typical.voxelize,
+        typical.fill,
+        typical.light,
+        typical.encode,
         gpu.info()
     ));
     if let (Some(mut file), Some(path)) = (report, &args.report) {
@@ -126,7 +126,7 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<ExitCode> {
             seconds,
             frames: args.frames,
             adapter: AdapterReport::from(gpu.info()),
-            median_ms: median,
+            median_ms: typical,
             frames_ms,
             warnings: reporter.warnings(),
         };
@@ -170,11 +170,7 @@ fn choose<'a>(
 }
 
 fn medians(frames: &[FrameTimes]) -> FrameTimes {
-    let median = |of: fn(&FrameTimes) -> f64| {
-        let mut all: Vec<f64> = frames.iter().map(of).collect();
-        all.sort_by(f64::total_cmp);
-        all.get(all.len() / 2).copied().unwrap_or(0.0)
-    };
+    let median = |of: fn(&FrameTimes) -> f64| median(&frames.iter().map(of).collect::<Vec<_>>());
     FrameTimes {
         deform: median(|f| f.deform),
         prepare: median(|f| f.prepare),

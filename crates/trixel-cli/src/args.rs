@@ -466,6 +466,7 @@ Examples:
   trixel bench bunny.ply scene:room -r 256 --counters
   trixel bench --table cl torus.obj horse.ply dragon.ply
   trixel bench --table fills bunny.ply -r 64,128,256
+  trixel bench --table effects scene:torus horse.ply -r 128,256
   trixel bench --figure 3.13 --figure 3.14 scene:room --html sweep.html
   trixel bench --lists bunny.ply scene:room
   trixel bench --compare results.json";
@@ -553,6 +554,8 @@ pub(crate) enum TableArg {
     Cl,
     /// No times, but how many voxels the fills of Chang and Lai 2011 get wrong.
     Fills,
+    /// What a frame of each lighting effect of Chang and Lai 2011 takes.
+    Effects,
 }
 
 /// A figure of Rauwendaal 2012.

@@ -18,7 +18,7 @@ use crate::args::{BackendArg, BenchArgs, FigureArg, TableArg};
 use crate::grid::usage;
 use crate::progress::Reporter;
 use crate::voxelize::set_threads;
-use crate::{mesh, volume};
+use crate::{bench_effects, mesh, volume};
 
 /// Cutoffs of figure 3.14, in square voxels: its steps show at low ones.
 const LOW_CUTOFFS: [f32; 14] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.0, 16.0];
@@ -26,8 +26,10 @@ const LOW_CUTOFFS: [f32; 14] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6
 const HIGH_CUTOFFS: [f32; 7] = [32.0, 64.0, 128.0, 256.0, 512.0, 1024.0, 2048.0];
 
 pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
-    if args.table == Some(TableArg::Fills) {
-        return fills(args);
+    match args.table {
+        Some(TableArg::Fills) => return fills(args),
+        Some(TableArg::Effects) => return bench_effects::run(args),
+        Some(TableArg::Hcv | TableArg::Cl) | None => {}
     }
     let mode = mode(args);
     let strategies = strategies(args, mode);
@@ -79,7 +81,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<ExitCode> {
     parts.extend(text::sweeps(&results));
     parts.extend(args.table.map(|table| match table {
         TableArg::Cl => text::published_cl(),
-        TableArg::Hcv | TableArg::Fills => text::published(),
+        TableArg::Hcv | TableArg::Fills | TableArg::Effects => text::published(),
     }));
     parts.extend(before.map(|before| compare::text(&results, &before)));
     match write!(std::io::stdout().lock(), "{}", parts.join("\n")) {
@@ -125,7 +127,7 @@ fn mode(args: &BenchArgs) -> Mode {
     let default = match args.table {
         Some(TableArg::Hcv) => Mode::Thin,
         Some(TableArg::Cl) => Mode::Sliced,
-        Some(TableArg::Fills) | None => Mode::Conservative,
+        Some(TableArg::Fills | TableArg::Effects) | None => Mode::Conservative,
     };
     args.mode.map_or(default, Mode::from)
 }
@@ -149,7 +151,7 @@ fn strategies(args: &BenchArgs, mode: Mode) -> Vec<Strategy> {
 }
 
 /// Names and meshes.
-fn inputs(args: &BenchArgs) -> Result<Vec<(String, String)>> {
+pub(crate) fn inputs(args: &BenchArgs) -> Result<Vec<(String, String)>> {
     let mut inputs: Vec<_> = args.inputs.iter().map(|input| (mesh::stem(input), input.clone())).collect();
     if let Some(folder) = &args.models {
         inputs.extend(manifest(folder)?);

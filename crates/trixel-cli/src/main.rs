@@ -4,6 +4,7 @@ mod animate;
 mod args;
 mod attributes;
 mod bench;
+mod bench_effects;
 mod engine;
 mod grid;
 mod info;

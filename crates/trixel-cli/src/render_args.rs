@@ -7,7 +7,7 @@ use trixel_render::light::{
     Background, Effect, Environment, Floor, LightOptions, Medium, Orbit, Sun, Surfaces, Thickness,
 };
 
-use crate::args::UpArg;
+use crate::args::{FillArg, UpArg};
 
 pub(crate) const RENDER_EXAMPLES: &str = "\
 Examples:
@@ -137,6 +137,11 @@ pub(crate) struct LightArgs {
         value_parser = clap::value_parser!(u32).range(0..=4))]
     pub(crate) normal_filter: u32,
 
+    /// How insides are found; by default by exact parity where a material's surface is closed, and by xor, which repairs
+    /// holes, where it is not.
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Effect")]
+    pub(crate) fill: Option<FillArg>,
+
     /// How thick open surfaces such as leaves are, in longest sides of the object; for shadows.
     #[arg(long, value_name = "T", default_value_t = LightOptions::default().sheet_thickness, help_heading = "Effect")]
     pub(crate) sheet_thickness: f64,
@@ -242,6 +247,7 @@ impl LightArgs {
             max_surfaces: self.max_surfaces,
             double_hit_angle: self.double_hit_angle,
             normal_filter: self.normal_filter,
+            fill: self.fill.map(Into::into),
             sheet_thickness: self.sheet_thickness,
         }
     }

@@ -413,6 +413,9 @@ fn light_is_rendered_and_compared_and_filmed() {
     bench.ok(&format!("{film} -o film.apng"));
     assert_eq!(std::fs::read_dir(bench.path("frames")).unwrap().count(), 3);
 
+    let table = bench.ok("bench --table effects scene:cube -r 8 --repeat 1 --adapter llvmpipe").stdout;
+    assert_eq!((table.lines().count(), table.matches("cube ").count()), (7, 4), "{table}");
+
     for (status, arguments, words) in [
         (1, "render scene:torus -o a.jpg", ["a.jpg", ".png"]),
         (1, "render scene:glass-ball --material wood=1.5 -o a.png", ["wood", "`amber`"]),

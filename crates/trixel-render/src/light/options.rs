@@ -1,5 +1,7 @@
 //! What is rendered, and how.
 
+use trixel::fill::Fill;
+
 use super::camera::Orbit;
 use super::environment::Environment;
 use super::error::LightError;
@@ -85,6 +87,9 @@ pub struct LightOptions {
     pub double_hit_angle: f64,
     /// How often normals are filtered with their neighbours, 0 to 4.
     pub normal_filter: u32,
+    /// How insides are found; `None` for exact parity where a material's surface is closed, and [`Fill::Xor`], which repairs
+    /// holes (\[CL\] 2.3), where it is not. The reference has none.
+    pub fill: Option<Fill>,
     /// Thickness of materials that consist of sheets, such as leaves, in longest sides of the object, 0 to 1.
     pub sheet_thickness: f64,
 }
@@ -102,6 +107,7 @@ impl Default for LightOptions {
             max_surfaces: 12,
             double_hit_angle: 30.0,
             normal_filter: 2,
+            fill: None,
             sheet_thickness: 0.01,
         }
     }

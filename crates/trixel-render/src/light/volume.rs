@@ -6,8 +6,9 @@ use glam::Vec3;
 use half::f16;
 use rayon::prelude::*;
 use trixel::attributes::{AttributeKind, AttributeRequest, Combine, Values, compute};
+use trixel::fill::Fill;
 use trixel::lattice::LatticeMesh;
-use trixel::{Backend, Bounds, CpuBackend, Grid, Job, Mode, Volume};
+use trixel::{Backend, Bounds, CpuBackend, Grid, Job, Mesh, Mode, Topology, Volume};
 
 use super::error::LightError;
 use super::options::LightOptions;
@@ -34,7 +35,8 @@ const MARGIN: u32 = 3;
 const FINEST: u32 = 512;
 
 impl OpticalVolume {
-    /// Voxelizes a scene. Insides are exact, by parity, on a grid that is up to four times finer along each axis.
+    /// Voxelizes a scene. Insides are those of a grid that is up to four times finer along each axis, by
+    /// [`LightOptions::fill`].
     ///
     /// # Errors
     /// When memory runs out, or there are more than [`OpticalScene::MAX_CLASSES`] classes.
@@ -50,7 +52,7 @@ impl OpticalVolume {
         let surface = surface(scene, &grid, options)?;
         let voxelize_ms = start.elapsed().as_secs_f64() * 1e3;
         let start = Instant::now();
-        let shares = shares(scene, &grid)?;
+        let shares = shares(scene, &grid, options.fill)?;
         Ok(Self { dims, origin, voxel, shares, surface, voxelize_ms, fill_ms: start.elapsed().as_secs_f64() * 1e3 })
     }
 }
@@ -90,19 +92,13 @@ fn surface(scene: &OpticalScene, grid: &Grid, options: &LightOptions) -> Result<
 }
 
 /// The share of each voxel that each class fills.
-fn shares(scene: &OpticalScene, grid: &Grid) -> Result<Vec<[u8; 4]>, LightError> {
+fn shares(scene: &OpticalScene, grid: &Grid, fill: Option<Fill>) -> Result<Vec<[u8; 4]>, LightError> {
     let longest = grid.dims().into_iter().max().unwrap_or(1);
     let fine = [4, 2].into_iter().find(|n| longest * n <= FINEST + 8 * MARGIN).unwrap_or(1);
     let voxel = grid.voxel_size()[0] / f64::from(fine);
     let fine_grid = Grid::new(grid.origin(), [voxel; 3], grid.dims().map(|n| n * fine))?;
     let insides = (0..scene.classes.len())
-        .map(|class| {
-            let part = scene.part_of_class(class);
-            let lattice = LatticeMesh::snap(&part, &fine_grid).map_err(trixel::Error::from)?;
-            let mut inside = Volume::new(fine_grid)?;
-            CpuBackend::default().voxelize(&lattice, &Job::new(fine_grid, Mode::Solid), &mut inside)?;
-            Ok(inside)
-        })
+        .map(|class| inside(&scene.part_of_class(class), &fine_grid, fill))
         .collect::<Result<Vec<_>, LightError>>()?;
     let layout = Layout::of(grid);
     let [nx, ny, nz] = grid.dims();
@@ -140,6 +136,16 @@ fn shares(scene: &OpticalScene, grid: &Grid) -> Result<Vec<[u8; 4]>, LightError>
         }
     }
     Ok(shares)
+}
+
+/// The inside of what one class is made of.
+fn inside(part: &Mesh, grid: &Grid, fill: Option<Fill>) -> Result<Volume, LightError> {
+    let fill = fill.unwrap_or_else(|| if Topology::of(part).open_edges == 0 { Fill::Parity } else { Fill::Xor });
+    let lattice = LatticeMesh::snap(part, grid).map_err(trixel::Error::from)?;
+    let mut voxels = Volume::new(*grid)?;
+    let mode = if fill == Fill::Parity { Mode::Solid } else { Mode::Sliced };
+    CpuBackend::default().voxelize(&lattice, &Job::new(*grid, mode), &mut voxels)?;
+    if fill == Fill::Parity { Ok(voxels) } else { Ok(trixel::fill::fill(&voxels, fill)?.0) }
 }
 
 /// Where a voxel's texel is.
@@ -215,6 +221,26 @@ mod tests {
         let expected = std::f64::consts::PI / 6.0;
         assert!((sum * sphere.voxel.powi(3) / expected - 1.0).abs() < 0.01);
         assert!(sphere.shares.iter().all(|share| share[1..] == [0; 3]));
+    }
+
+    /// The share of air that is taken for glass, of all voxels, above a torus whose bottom has holes.
+    #[test]
+    fn holes_do_not_leak_upwards() {
+        let mut mesh = trixel::scene::build("torus:64").unwrap();
+        let triangles = mesh.triangles.iter().copied().enumerate();
+        let low = |t: &[u32; 3]| t.iter().all(|&v| mesh.positions[v as usize][2] < -0.3);
+        mesh.triangles = triangles.filter(|(i, t)| !(low(t) && i % 40 == 0)).map(|(_, t)| t).collect();
+        let placement = Placement::new(&mesh.bounds().unwrap(), trixel::UpAxis::Z).unwrap();
+        let scene = OpticalScene::new(&mesh, &placement, &Medium::of_mesh(&mesh)).unwrap();
+        let above = |fill: Option<Fill>| {
+            let options = LightOptions { resolution: 48, fill, ..LightOptions::default() };
+            let torus = OpticalVolume::new(&scene, &options).unwrap();
+            let [nx, ny, nz] = torus.dims.map(|n| n as usize);
+            let top = torus.shares.chunks_exact(nx * ny).skip(nz - 2).flatten();
+            top.filter(|share| share[0] > 0).count()
+        };
+        assert!(above(Some(Fill::Parity)) > 10, "the holes are there");
+        assert_eq!(above(None), 0);
     }
 
     #[test]
