@@ -178,9 +178,15 @@ impl Node {
     fn meets(&self, origin: DVec3, inverse: DVec3, limit: f64) -> bool {
         let (mut near, mut far) = (0.0_f64, limit);
         for axis in 0..3 {
+            if inverse[axis].is_infinite() {
+                // Along the faces, which count as inside: infinity times their distances of 0 would be no number.
+                if origin[axis] < self.low[axis] || origin[axis] > self.high[axis] {
+                    return false;
+                }
+                continue;
+            }
             let a = (self.low[axis] - origin[axis]) * inverse[axis];
             let b = (self.high[axis] - origin[axis]) * inverse[axis];
-            // 0 times infinity: the ray runs in the face of the box, which counts as inside. `max` and `min` skip NaN.
             near = near.max(a.min(b));
             far = far.min(a.max(b));
         }

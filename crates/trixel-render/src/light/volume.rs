@@ -256,10 +256,11 @@ mod tests {
             }));
             let [x, y, z, free] = texel.map(f16::to_f32);
             let normal = Vec3::new(x, y, z);
-            if normal != Vec3::ZERO {
+            let away = (p.length() - 0.5).abs() / sphere.voxel as f32;
+            // Where the surface is; further out the filter sees less of it.
+            if away < 1.5 {
                 assert!(normal.dot(p.normalize()) > 0.98, "{p} {normal}");
             }
-            let away = (p.length() - 0.5).abs() / sphere.voxel as f32;
             assert!(free <= away + 1.0, "{free} {away}");
         }
     }
