@@ -111,12 +111,15 @@ pub(crate) struct LightArgs {
     #[arg(long, value_enum, default_value_t, value_name = "WHICH", help_heading = "Effect")]
     pub(crate) thickness: ThicknessArg,
 
-    /// What a material does to light: [NAME=]INDEX[:ABSORPTION] or [NAME=]INDEX:RED,GREEN,BLUE; without NAME all of them.
-    ///
-    /// INDEX is the refraction index (glass 1.5, water 1.33, air 1). ABSORPTION is the natural logarithm of the share of light
-    /// that is lost over the object's longest side. By default what the file says: its index, and of light through a third of
-    /// the object its base colour is left. Where the insides of two materials overlap the later one counts.
-    #[arg(short, long = "material", value_name = "OPTICS", help_heading = "Effect", value_parser = parse_optics)]
+    // Brackets in a comment would be links.
+    #[arg(short, long = "material", value_name = "OPTICS", help_heading = "Effect", value_parser = parse_optics,
+        help = "What a material does to light: [NAME=]INDEX[:ABSORPTION] or [NAME=]INDEX:RED,GREEN,BLUE; without NAME all \
+            of them",
+        long_help = "What a material does to light: [NAME=]INDEX[:ABSORPTION] or [NAME=]INDEX:RED,GREEN,BLUE; without NAME \
+            all of them.\n\nINDEX is the refraction index (glass 1.5, water 1.33, air 1). ABSORPTION is the natural logarithm \
+            of the share of light that is lost over the object's longest side. By default what the file says: its index, \
+            and of light through a third of the object its base colour is left. Where the insides of two materials overlap \
+            the later one counts.")]
     pub(crate) materials: Vec<Optics>,
 
     /// Leave out what the outermost surface mirrors.
