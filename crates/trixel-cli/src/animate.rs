@@ -103,11 +103,16 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<ExitCode> {
     let (mut staged, _folder) = written?;
 
     let typical = medians(&frames_ms);
+    let played = match animation {
+        None => input.to_owned(),
+        Some(Animation { name: "", seconds }) => format!("animation {number} ({seconds:.2} s)"),
+        Some(Animation { name, seconds }) => format!("animation `{name}` ({seconds:.2} s)"),
+    };
     reporter.say(&format!(
         "{} frames of {}; median of a frame: deformed in {:.1} ms, prepared in {:.1} ms, voxelized in {:.0} ms, filled in \
          {:.0} ms, lit in {:.0} ms, encoded in {:.0} ms on {}",
         args.frames,
-        animation.map_or_else(|| input.to_owned(), |a| format!("animation `{}` ({:.2} s)", a.name, a.seconds)),
+        played,
         typical.deform,
         typical.prepare,
         typical.voxelize,
