@@ -5,19 +5,19 @@
 //!
 //! | box | path |
 //! |---|---|
-//! | one voxel along at least two axes, where touching is enough | the box itself |
-//! | at most four voxels along each axis | [`tiny`]: eight triangles at a time |
+//! | at most four voxels along each axis | [`tiny`]: sixteen triangles at a time |
+//! | the same, in mode solid | [`crossings`]: sixteen triangles at a time |
+//! | one voxel along two axes, where touching is enough | the box itself |
 //! | at most 64 voxels | [`rows`]: eight columns at a time |
 //! | larger | [`large`]: runs that follow lines |
 
-use fearless_simd::Simd;
+use fearless_simd::{Simd, i32x16, prelude::*};
 
 use super::number::SMALL_EXTENT;
-use super::rule::{Rule, SurfaceRule};
-use super::sink::Sink;
-use super::tiny::TinyBox;
-use super::triangles::Selected;
-use super::{large, rows, tiny};
+use super::rule::{Rule, Sliced, Solid, SurfaceRule};
+use super::sink::{CubeSink, Sink};
+use super::triangles::{Block, LANES, Queue, Selected, Vectors};
+use super::{crossings, large, rows, tiny};
 use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
 
 /// The voxel indices of a box, both ends included.
@@ -50,17 +50,6 @@ impl VoxelBox {
     pub(super) fn extent(&self) -> [i64; 3] {
         [self.high[0] - self.low[0], self.high[1] - self.low[1], self.high[2] - self.low[2]]
     }
-
-    /// Whether the box meets `other`, and lies inside it along z.
-    #[inline(always)]
-    fn meets_with_all_of_z(&self, other: &Self) -> bool {
-        (self.high[0] >= other.low[0])
-            & (self.high[1] >= other.low[1])
-            & (self.low[2] >= other.low[2])
-            & (self.low[0] <= other.high[0])
-            & (self.low[1] <= other.high[1])
-            & (self.high[2] <= other.high[2])
-    }
 }
 
 /// Buffers that one thread keeps between triangles.
@@ -77,163 +66,245 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
     rule: &R,
     triangles: Selected<'_>,
     clip: &VoxelBox,
-    sink: &mut impl Sink,
+    sink: &mut impl CubeSink,
 ) {
     let mut scratch = Scratch::default();
-    let mut tiny = Tiny::new();
-    triangles.for_each(
+    let mut waiting = Waiting::new();
+    let base = triangles.base(clip);
+    let near = NearClip::new(simd, clip, base);
+    for_each_vector(
+        simd,
+        triangles,
+        base,
         #[inline(always)]
-        |triangle| {
-            let around = VoxelBox::around(triangle);
-            let extent = around.extent();
-            if extent[0] | extent[1] | extent[2] <= 3 && around.meets_with_all_of_z(clip) {
-                tiny.push(simd, rule, triangle, &TinyBox::new(&around, clip), sink);
+        |at, corners, lanes| {
+            let [low, high] = corners.boxes();
+            let meets = near.meets(&low, &high) & lanes;
+            if meets == 0 {
                 return;
             }
-            let Some(clipped) = around.clipped(clip) else { return };
-            if R::TOUCH_IS_ENOUGH && extent[0].min(1) + extent[1].min(1) + extent[2].min(1) <= 1 {
-                // Strictly inside a row of voxels.
-                for x in clipped.low[0]..=clipped.high[0] {
-                    for y in clipped.low[1]..=clipped.high[1] {
-                        sink.run(x, y, clipped.low[2], clipped.high[2]);
-                    }
-                }
-                return;
+            let extent = [high[0] - low[0], high[1] - low[1], high[2] - low[2]];
+            let longest = extent[0].max(extent[1]).max(extent[2]);
+            let at_most = |voxels: i32| longest.simd_le(voxels - 1).to_bitmask();
+            let inside = near.holds_z(&low, &high) & meets;
+            let mut tiny = at_most(4) & inside;
+            let two = at_most(2) & tiny;
+            if two != 0 && waiting.twos.push(simd, &corners, two) {
+                simd.vectorize(
+                    #[inline(always)]
+                    || tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, &near, sink),
+                );
             }
-            by_size(simd, rule, triangle, &around, &clipped, sink, &mut scratch);
-        },
-    );
-    tiny.flush(simd, rule, sink);
-}
-
-/// `extent + 1` bits, `step` apart.
-#[inline(always)]
-fn row_bits(extent: i64, step: u32) -> u64 {
-    let all = 1 | 1 << step | 1 << (2 * step) | 1 << (3 * step);
-    all & ((2 << (extent * i64::from(step))) - 1)
-}
-
-/// The batches of tiny triangles, by the size of their boxes.
-struct Tiny {
-    cubes2: tiny::Cubes<2>,
-    cubes3: tiny::Cubes<3>,
-    cubes4: tiny::Cubes<4>,
-    flats2: tiny::Flats<2>,
-    flats4: tiny::Flats<4>,
-}
-
-impl Tiny {
-    fn new() -> Self {
-        Self {
-            cubes2: tiny::Cubes::new(),
-            cubes3: tiny::Cubes::new(),
-            cubes4: tiny::Cubes::new(),
-            flats2: tiny::Flats::new(),
-            flats4: tiny::Flats::new(),
-        }
-    }
-
-    /// Takes a triangle whose box has at most four voxels along each axis.
-    #[inline(always)]
-    fn push<V: Simd, R: SurfaceRule>(
-        &mut self,
-        simd: V,
-        rule: &R,
-        triangle: &[[i64; 3]; 3],
-        tiny: &TinyBox,
-        sink: &mut impl Sink,
-    ) {
-        let extent = tiny.extent;
-        let longest = extent[0].max(extent[1]).max(extent[2]);
-        if R::TOUCH_IS_ENOUGH {
-            let axes = extent[0].min(1) + extent[1].min(1) + extent[2].min(1);
-            if axes <= 1 {
-                // Strictly inside a row of voxels, and connected: it meets them all. Bits of a cube of four.
-                let bits = row_bits(extent[2], 1) | row_bits(extent[1], 4) | row_bits(extent[0], 16);
-                sink.cube::<4>(tiny.low, bits & tiny.keep::<4>());
-                return;
-            }
-            if axes == 2 {
-                if longest <= 1 {
-                    if self.flats2.push(triangle, tiny) {
+            tiny &= !two;
+            if tiny != 0 {
+                let mut rest = tiny;
+                if R::TOUCH_IS_ENOUGH {
+                    let shortest = extent[0].min(extent[1]).min(extent[2]);
+                    let flat = shortest.simd_le(0).to_bitmask() & tiny;
+                    if flat != 0 && waiting.flats.push(simd, &corners, flat) {
                         simd.vectorize(
                             #[inline(always)]
-                            || self.flats2.flush(simd, rule, sink),
+                            || tiny::flush_flats(simd, rule, &mut waiting.flats, &near, sink),
                         );
                     }
-                } else if self.flats4.push(triangle, tiny) {
+                    rest &= !flat;
+                }
+                let three = at_most(3) & rest;
+                if three != 0 && waiting.threes.push(simd, &corners, three) {
                     simd.vectorize(
                         #[inline(always)]
-                        || self.flats4.flush(simd, rule, sink),
+                        || tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, &near, sink),
                     );
                 }
-                return;
+                let four = rest & !three;
+                if four != 0 && waiting.fours.push(simd, &corners, four) {
+                    simd.vectorize(
+                        #[inline(always)]
+                        || tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, &near, sink),
+                    );
+                }
             }
-        }
-        if longest <= 1 {
-            if self.cubes2.push(triangle, tiny) {
-                simd.vectorize(
-                    #[inline(always)]
-                    || self.cubes2.flush(simd, rule, sink),
-                );
-            }
-        } else if longest <= 2 {
-            if self.cubes3.push(triangle, tiny) {
-                simd.vectorize(
-                    #[inline(always)]
-                    || self.cubes3.flush(simd, rule, sink),
-                );
-            }
-        } else if self.cubes4.push(triangle, tiny) {
-            simd.vectorize(
-                #[inline(always)]
-                || self.cubes4.flush(simd, rule, sink),
-            );
-        }
-    }
-
-    /// Sends the voxels of all triangles that still wait.
-    #[inline(always)]
-    fn flush<V: Simd, R: SurfaceRule>(&mut self, simd: V, rule: &R, sink: &mut impl Sink) {
-        self.cubes2.flush(simd, rule, sink);
-        self.cubes3.flush(simd, rule, sink);
-        self.cubes4.flush(simd, rule, sink);
-        self.flats2.flush(simd, rule, sink);
-        self.flats4.flush(simd, rule, sink);
-    }
-}
-
-/// Sends the voxels of a mode that looks along z from voxel centres to `sink`.
-///
-/// For [`super::rule::Solid`], the sink gets runs from the lowest voxel whose centre is not below the triangle to the top
-/// of the clip; a triangle below the clip gives whole columns.
-#[inline(always)]
-pub(super) fn centres<V: Simd, R: Rule>(
-    simd: V,
-    rule: &R,
-    triangles: Selected<'_>,
-    clip: &VoxelBox,
-    sink: &mut impl Sink,
-) {
-    const HALF: i64 = (STEPS_PER_VOXEL / 2) as i64;
-    let mut scratch = Scratch::default();
-    triangles.for_each(
-        #[inline(always)]
-        |triangle| {
-            let [a, b, c] = triangle;
-            // The columns whose centres are inside the closed box: for small triangles mostly none.
-            let low = |i: usize| (a[i].min(b[i]).min(c[i]) - HALF + (2 * HALF - 1)) >> STEP_BITS;
-            let high = |i: usize| (a[i].max(b[i]).max(c[i]) - HALF) >> STEP_BITS;
-            let columns = VoxelBox {
-                low: [low(0).max(clip.low[0]), low(1).max(clip.low[1]), clip.low[2]],
-                high: [high(0).min(clip.high[0]), high(1).min(clip.high[1]), clip.high[2]],
-            };
-            if columns.low[0] <= columns.high[0] && columns.low[1] <= columns.high[1] {
-                let around = VoxelBox::around(triangle);
-                by_size(simd, rule, triangle, &around, &columns, sink, &mut scratch);
+            for lane in set_bits(meets & !two & !tiny) {
+                let triangle = triangles.corners(at + lane);
+                let around = VoxelBox::around(&triangle);
+                let Some(clipped) = around.clipped(clip) else { continue };
+                let extent = around.extent();
+                if R::TOUCH_IS_ENOUGH && extent[0].min(1) + extent[1].min(1) + extent[2].min(1) <= 1 {
+                    // Strictly inside a row of voxels.
+                    for x in clipped.low[0]..=clipped.high[0] {
+                        for y in clipped.low[1]..=clipped.high[1] {
+                            sink.run(x, y, clipped.low[2], clipped.high[2]);
+                        }
+                    }
+                    continue;
+                }
+                by_size(simd, rule, &triangle, &around, &clipped, sink, &mut scratch);
             }
         },
     );
+    tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, &near, sink);
+    tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, &near, sink);
+    tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, &near, sink);
+    tiny::flush_flats(simd, rule, &mut waiting.flats, &near, sink);
+}
+
+/// Calls `each` with the number of the first, the corners and the used lanes of every vector of triangles.
+#[inline(always)]
+fn for_each_vector<V: Simd>(
+    simd: V,
+    triangles: Selected<'_>,
+    base: [i64; 3],
+    mut each: impl FnMut(usize, Vectors<V>, u64),
+) {
+    let mut block = Block::NONE;
+    let mut start = 0;
+    while start < triangles.len() {
+        let count = triangles.load(start, base, &mut block);
+        let mut first = 0;
+        while first < count {
+            let lanes = u64::MAX >> (64 - (count - first).min(LANES));
+            each(start + first, block.vectors(simd, first), lanes);
+            first += LANES;
+        }
+        start += count;
+    }
+}
+
+/// The numbers of the bits that are set, ascending.
+#[inline(always)]
+fn set_bits(mut mask: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = (mask != 0).then_some(mask.trailing_zeros() as usize);
+        mask &= mask.wrapping_sub(1);
+        bit
+    })
+}
+
+/// The clip as seen from the base of a block's corners.
+pub(super) struct NearClip<V: Simd> {
+    pub(super) base: [i64; 3],
+    pub(super) low: [i32x16<V>; 3],
+    pub(super) high: [i32x16<V>; 3],
+}
+
+impl<V: Simd> NearClip<V> {
+    #[inline(always)]
+    fn new(simd: V, clip: &VoxelBox, base: [i64; 3]) -> Self {
+        let splat = |voxel: [i64; 3]| {
+            // Clips are pieces of grids, which have at most 32768 voxels along an axis.
+            let near =
+                |i: usize| i32::try_from(voxel[i] - base[i]).unwrap_or(if voxel[i] < base[i] { -LIMIT } else { LIMIT });
+            [i32x16::splat(simd, near(0)), i32x16::splat(simd, near(1)), i32x16::splat(simd, near(2))]
+        };
+        const LIMIT: i32 = 1 << 30;
+        Self { base, low: splat(clip.low), high: splat(clip.high) }
+    }
+
+    /// The lanes whose boxes meet the clip.
+    #[inline(always)]
+    fn meets(&self, low: &[i32x16<V>; 3], high: &[i32x16<V>; 3]) -> u64 {
+        let mut meets = low[0].simd_le(self.high[0]) & high[0].simd_ge(self.low[0]);
+        for i in 1..3 {
+            meets = meets & low[i].simd_le(self.high[i]) & high[i].simd_ge(self.low[i]);
+        }
+        meets.to_bitmask()
+    }
+
+    /// The lanes whose boxes are inside the clip along z.
+    #[inline(always)]
+    fn holds_z(&self, low: &[i32x16<V>; 3], high: &[i32x16<V>; 3]) -> u64 {
+        (low[2].simd_ge(self.low[2]) & high[2].simd_le(self.high[2])).to_bitmask()
+    }
+}
+
+/// The tiny triangles that wait, by the size of their boxes.
+struct Waiting {
+    twos: Queue,
+    threes: Queue,
+    fours: Queue,
+    /// At most four voxels along two axes, and one along the third.
+    flats: Queue,
+}
+
+impl Waiting {
+    fn new() -> Self {
+        Self { twos: Queue::EMPTY, threes: Queue::EMPTY, fours: Queue::EMPTY, flats: Queue::EMPTY }
+    }
+}
+
+/// Sends the toggles of mode solid inside `clip` to `sink`: runs from the lowest voxel whose centre is not below the
+/// triangle to the top of the clip. A triangle below the clip gives whole columns.
+#[inline(always)]
+pub(super) fn solid<V: Simd>(simd: V, rule: &Solid, triangles: Selected<'_>, clip: &VoxelBox, sink: &mut impl Sink) {
+    let mut scratch = Scratch::default();
+    let mut waiting = Queue::EMPTY;
+    let base = triangles.base(clip);
+    let near = NearClip::new(simd, clip, base);
+    for_each_vector(
+        simd,
+        triangles,
+        base,
+        #[inline(always)]
+        |at, corners, lanes| {
+            let columns = crossings::columns(&corners, &near);
+            let mut some = lanes;
+            let mut few = lanes;
+            for [low, high] in columns {
+                some &= low.simd_le(high).to_bitmask();
+                few &= (high - low).simd_le(1).to_bitmask();
+            }
+            if some == 0 {
+                return;
+            }
+            let [low, high] = corners.boxes();
+            let longest = (high[0] - low[0]).max(high[1] - low[1]).max(high[2] - low[2]);
+            let tiny = few & some & longest.simd_le(3).to_bitmask();
+            if tiny != 0 && waiting.push(simd, &corners, tiny) {
+                simd.vectorize(
+                    #[inline(always)]
+                    || crossings::flush(simd, &mut waiting, &near, clip, sink),
+                );
+            }
+            for lane in set_bits(some & !tiny) {
+                centre(simd, rule, &triangles.corners(at + lane), clip, sink, &mut scratch);
+            }
+        },
+    );
+    crossings::flush(simd, &mut waiting, &near, clip, sink);
+}
+
+/// Sends the voxels of mode sliced inside `clip` to `sink`.
+#[inline(always)]
+pub(super) fn sliced<V: Simd>(simd: V, rule: &Sliced, triangles: Selected<'_>, clip: &VoxelBox, sink: &mut impl Sink) {
+    let mut scratch = Scratch::default();
+    for i in 0..triangles.len() {
+        centre(simd, rule, &triangles.corners(i), clip, sink, &mut scratch);
+    }
+}
+
+/// Sends the voxels of a triangle in a mode that looks along z from voxel centres.
+#[inline(always)]
+fn centre<V: Simd, R: Rule>(
+    simd: V,
+    rule: &R,
+    triangle: &[[i64; 3]; 3],
+    clip: &VoxelBox,
+    sink: &mut impl Sink,
+    scratch: &mut Scratch,
+) {
+    const HALF: i64 = (STEPS_PER_VOXEL / 2) as i64;
+    let [a, b, c] = triangle;
+    // The columns whose centres are inside the closed box: for small triangles mostly none.
+    let low = |i: usize| (a[i].min(b[i]).min(c[i]) - HALF + (2 * HALF - 1)) >> STEP_BITS;
+    let high = |i: usize| (a[i].max(b[i]).max(c[i]) - HALF) >> STEP_BITS;
+    let columns = VoxelBox {
+        low: [low(0).max(clip.low[0]), low(1).max(clip.low[1]), clip.low[2]],
+        high: [high(0).min(clip.high[0]), high(1).min(clip.high[1]), clip.high[2]],
+    };
+    if columns.low[0] <= columns.high[0] && columns.low[1] <= columns.high[1] {
+        let around = VoxelBox::around(triangle);
+        by_size(simd, rule, triangle, &around, &columns, sink, scratch);
+    }
 }
 
 /// The path for a triangle that is not tiny.

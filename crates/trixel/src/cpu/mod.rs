@@ -1,7 +1,7 @@
 //! The CPU backend.
 //!
 //! - `kernel`: one triangle after the other, each to the path for its size
-//! - `tiny`, `rows`, `large`: the paths
+//! - `tiny`, `crossings`, `rows`, `large`: the paths
 //! - `instructions`: the vector instructions they are compiled for
 //! - `setup`: what paths compute first
 //! - `rule`: the modes as thresholds
@@ -9,10 +9,11 @@
 //! - `number`: exact integers and floor lines
 //! - `sink`: runs into bits, toggles into parity
 //! - `painter`: a mode and the instructions, together
-//! - `triangles`: which triangles, and their corners
+//! - `triangles`: which triangles, and their corners, alone or as vectors
 //! - `slabs`: a dense grid cut along x, one piece a task, so that threads never share a word
 //! - `pillars`: a sparse grid cut into pillars of bricks
 
+mod crossings;
 pub(crate) mod fragments;
 mod instructions;
 mod kernel;

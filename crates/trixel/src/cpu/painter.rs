@@ -43,11 +43,11 @@ impl Painter {
             Mode::Thin => surface(self.level, &Thin, triangles, clip, slab),
             Mode::Sliced => {
                 let (rule, mut sink) = (Sliced { overlap: self.overlap }, SetRuns(slab));
-                dispatch!(self.level, simd => kernel::centres(simd, &rule, triangles, clip, &mut sink));
+                dispatch!(self.level, simd => kernel::sliced(simd, &rule, triangles, clip, &mut sink));
             }
             Mode::Solid => {
                 let mut sink = ToggleRuns(slab);
-                dispatch!(self.level, simd => kernel::centres(simd, &Solid, triangles, clip, &mut sink));
+                dispatch!(self.level, simd => kernel::solid(simd, &Solid, triangles, clip, &mut sink));
             }
         }
     }

@@ -39,9 +39,12 @@ pub(super) trait Rule: Copy + Send + Sync {
 
 /// A surface mode's tests for triangles of at most four voxels along each axis, so small that floats are exact.
 pub(super) trait SurfaceRule: Rule {
-    /// The reach of an edge with inward normal `(na, nb)` in steps: a voxel passes where
-    /// `n . (S p - v) + edge_reach >= 0`.
-    fn edge_reach<V: Simd>(&self, simd: V, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V>;
+    /// How far beyond an edge's line a voxel's centre passes, for the absolute values of the edge's normal in a
+    /// projection: times half a voxel.
+    fn centre_reach<V: Simd>(&self, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V>;
+
+    /// How far from the plane a voxel's centre passes, for the absolute values of the normal: times half a voxel.
+    fn centre_plane_reach<V: Simd>(&self, n: [f64x8<V>; 3]) -> f64x8<V>;
 
     /// `(d1, d2)` for the normal `n`, oriented either way, and the corner `v0`, at most 2^18 in each coordinate.
     fn plane_bounds<V: Simd>(&self, simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>);
@@ -49,7 +52,7 @@ pub(super) trait SurfaceRule: Rule {
 
 /// N.p and N.r / S for `v0 = S p + r` with r within half a voxel of 0. With |N_i| at most 2^36 no term reaches 2^53.
 #[inline(always)]
-fn split_centred<V: Simd>(n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+pub(super) fn split_centred<V: Simd>(n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
     let steps = f64::from(STEPS_PER_VOXEL);
     let p = [
         (v0[0] * (1.0 / steps)).round_ties_even(),
@@ -105,9 +108,13 @@ impl Rule for Conservative {
 
 impl SurfaceRule for Conservative {
     #[inline(always)]
-    fn edge_reach<V: Simd>(&self, simd: V, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V> {
-        let zero = f64x8::splat(simd, 0.0);
-        (na.max(zero) + nb.max(zero)) * f64::from(STEPS_PER_VOXEL)
+    fn centre_reach<V: Simd>(&self, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V> {
+        na + nb
+    }
+
+    #[inline(always)]
+    fn centre_plane_reach<V: Simd>(&self, n: [f64x8<V>; 3]) -> f64x8<V> {
+        n[0] + n[1] + n[2]
     }
 
     #[inline(always)]
@@ -144,8 +151,13 @@ impl Rule for Thin {
 
 impl SurfaceRule for Thin {
     #[inline(always)]
-    fn edge_reach<V: Simd>(&self, _simd: V, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V> {
-        (na + nb + na.abs().max(nb.abs())) * f64::from(STEPS_PER_VOXEL / 2)
+    fn centre_reach<V: Simd>(&self, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V> {
+        na.max(nb)
+    }
+
+    #[inline(always)]
+    fn centre_plane_reach<V: Simd>(&self, n: [f64x8<V>; 3]) -> f64x8<V> {
+        n[0].max(n[1]).max(n[2])
     }
 
     #[inline(always)]

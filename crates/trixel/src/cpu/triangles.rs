@@ -1,6 +1,16 @@
-//! Which triangles the kernel is to go through, and their corners.
+//! Which triangles the kernel is to go through, and their corners: one by one, or in blocks for vectors.
 
-use crate::lattice::{LatticeMesh, LatticePositions};
+use fearless_simd::{Simd, f64x8, i32x16, prelude::*};
+
+use super::kernel::VoxelBox;
+use crate::lattice::{LatticeMesh, LatticePositions, STEP_BITS};
+
+/// Triangles that are judged together: lanes of a vector of `i32`.
+pub(super) const LANES: usize = 16;
+
+/// Triangles that are loaded together. Several vectors' worth, because a vector can only be read back some time after its
+/// parts were written.
+pub(super) const BLOCK: usize = 64;
 
 /// Some triangles of a mesh, one after the other.
 #[derive(Clone, Copy)]
@@ -11,15 +21,55 @@ pub(super) struct Selected<'a> {
 }
 
 impl Selected<'_> {
-    /// Calls `each` with the corners of every triangle.
+    /// The number of triangles.
     #[inline(always)]
-    pub(super) fn for_each(&self, mut each: impl FnMut(&[[i64; 3]; 3])) {
-        let count = self.indices.map_or(self.mesh.triangles.len(), <[u32]>::len);
-        // One loop for both, because `each` is a whole kernel.
-        for i in 0..count {
-            let triangle = self.indices.map_or(i, |indices| indices[i] as usize);
-            each(&corners(self.mesh, self.mesh.triangles[triangle]));
+    pub(super) fn len(&self) -> usize {
+        self.indices.map_or(self.mesh.triangles.len(), <[u32]>::len)
+    }
+
+    /// The corners of the `i`th.
+    #[inline(always)]
+    pub(super) fn corners(&self, i: usize) -> [[i64; 3]; 3] {
+        let triangle = self.indices.map_or(i, |indices| indices[i] as usize);
+        corners(self.mesh, self.mesh.triangles[triangle])
+    }
+
+    /// The voxel that the corners of blocks are seen from, so that they fit 32 bits wherever they may meet `clip`.
+    pub(super) fn base(&self, clip: &VoxelBox) -> [i64; 3] {
+        match self.mesh.positions {
+            LatticePositions::Narrow(_) => [0; 3],
+            LatticePositions::Wide(_) => [0, 1, 2].map(|i| (clip.low[i] + clip.high[i]) / 2),
         }
+    }
+
+    /// The triangles from `start` on, as many as fit a block.
+    pub(super) fn load(&self, start: usize, base: [i64; 3], block: &mut Block) -> usize {
+        let end = self.len().min(start + BLOCK);
+        let all = &self.mesh.triangles;
+        match (&self.mesh.positions, self.indices) {
+            (LatticePositions::Narrow(positions), None) => {
+                block.fill(&all[start..end], |&triangle| triangle, |vertex| positions[vertex as usize]);
+            }
+            (LatticePositions::Narrow(positions), Some(indices)) => {
+                block.fill(&indices[start..end], |&i| all[i as usize], |vertex| positions[vertex as usize]);
+            }
+            (LatticePositions::Wide(positions), indices) => {
+                // Beyond 32 bits, a corner is outside the clip by far; its triangle is not judged by these numbers.
+                #[expect(clippy::cast_possible_truncation, reason = "clamped")]
+                let near = |at: i64, base: i64| {
+                    (at - (base << STEP_BITS)).clamp(-i64::from(i32::MAX), i64::from(i32::MAX)) as i32
+                };
+                let corner = |vertex: u32| {
+                    let [x, y, z] = positions[vertex as usize];
+                    [near(x, base[0]), near(y, base[1]), near(z, base[2])]
+                };
+                match indices {
+                    None => block.fill(&all[start..end], |&triangle| triangle, corner),
+                    Some(indices) => block.fill(&indices[start..end], |&i| all[i as usize], corner),
+                }
+            }
+        }
+        end - start
     }
 }
 
@@ -34,4 +84,132 @@ pub(super) fn corners(mesh: &LatticeMesh<'_>, [a, b, c]: [u32; 3]) -> [[i64; 3];
         LatticePositions::Wide(positions) => positions[vertex as usize],
     };
     [corner(a), corner(b), corner(c)]
+}
+
+/// Corners of up to `N` triangles in lattice steps, axis by axis: corner k's axis i is row `3 k + i`.
+pub(super) struct Corners<const N: usize> {
+    rows: [[i32; N]; 9],
+}
+
+/// The triangles of one load.
+pub(super) type Block = Corners<BLOCK>;
+
+impl<const N: usize> Corners<N> {
+    pub(super) const NONE: Self = Self { rows: [[0; N]; 9] };
+
+    #[inline(always)]
+    fn fill<T>(&mut self, from: &[T], triangle: impl Fn(&T) -> [u32; 3], corner: impl Fn(u32) -> [i32; 3]) {
+        for (lane, from) in from.iter().enumerate().take(N) {
+            let [a, b, c] = triangle(from).map(&corner);
+            let all = [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]];
+            for (row, coordinate) in self.rows.iter_mut().zip(all) {
+                row[lane] = coordinate;
+            }
+        }
+    }
+
+    /// The corners of the [`LANES`] triangles from `first` on.
+    #[inline(always)]
+    pub(super) fn vectors<V: Simd>(&self, simd: V, first: usize) -> Vectors<V> {
+        let zero = i32x16::splat(simd, 0);
+        let mut corners = [[zero; 3]; 3];
+        for k in 0..3 {
+            for i in 0..3 {
+                corners[k][i] = i32x16::from_slice(simd, &self.rows[3 * k + i][first..first + LANES]);
+            }
+        }
+        Vectors(corners)
+    }
+}
+
+/// Corners of [`LANES`] triangles: corner k's axis i is `[k][i]`.
+#[derive(Clone, Copy)]
+pub(super) struct Vectors<V: Simd>(pub(super) [[i32x16<V>; 3]; 3]);
+
+/// A triangle's corners in two halves of the lanes, as floats.
+pub(super) type Halves<V> = [[[f64x8<V>; 3]; 3]; 2];
+
+impl<V: Simd> Vectors<V> {
+    #[inline(always)]
+    pub(super) fn least(&self, axis: usize) -> i32x16<V> {
+        self.0[0][axis].min(self.0[1][axis]).min(self.0[2][axis])
+    }
+
+    #[inline(always)]
+    pub(super) fn most(&self, axis: usize) -> i32x16<V> {
+        self.0[0][axis].max(self.0[1][axis]).max(self.0[2][axis])
+    }
+
+    /// The voxels whose closed cubes meet the triangles' closed bounding boxes: lowest and highest along each axis.
+    #[inline(always)]
+    pub(super) fn boxes(&self) -> [[i32x16<V>; 3]; 2] {
+        let [mut low, mut high] = [self.0[0]; 2];
+        for i in 0..3 {
+            low[i] = (self.least(i) - 1) >> STEP_BITS;
+            high[i] = self.most(i) >> STEP_BITS;
+        }
+        [low, high]
+    }
+
+    /// The corners as seen from `origin`, times `scale`, a power of two: within 2^24 steps.
+    #[inline(always)]
+    pub(super) fn floats(&self, simd: V, origin: [i32x16<V>; 3], scale: f32) -> Halves<V> {
+        let mut halves = [[[f64x8::splat(simd, 0.0); 3]; 3]; 2];
+        for k in 0..3 {
+            for i in 0..3 {
+                // Exact: an f32 holds 24 bits.
+                let local = (self.0[k][i] - origin[i]).to_float::<fearless_simd::f32x16<V>>() * scale;
+                let (first, second) = local.widen();
+                halves[0][k][i] = first;
+                halves[1][k][i] = second;
+            }
+        }
+        halves
+    }
+}
+
+/// Triangles of one kind that wait until there are enough for all lanes.
+pub(super) struct Queue {
+    /// Room for a vector that starts at any lane of the first.
+    corners: Corners<{ 2 * LANES }>,
+    count: usize,
+}
+
+impl Queue {
+    pub(super) const EMPTY: Self = Self { corners: Corners::NONE, count: 0 };
+
+    /// The number of triangles that wait.
+    #[inline(always)]
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The first that wait; beyond [`Self::count`], lanes hold anything.
+    #[inline(always)]
+    pub(super) fn vectors<V: Simd>(&self, simd: V) -> Vectors<V> {
+        self.corners.vectors(simd, 0)
+    }
+
+    /// Adds the triangles of the lanes in `mask`; `true` when all lanes are taken, and then [`Self::take`] must follow.
+    #[inline(always)]
+    pub(super) fn push<V: Simd>(&mut self, simd: V, from: &Vectors<V>, mask: u64) -> bool {
+        let lanes = fearless_simd::mask32x16::from_bitmask(simd, mask);
+        let at = self.count % LANES;
+        for k in 0..3 {
+            for i in 0..3 {
+                from.0[k][i].compress(lanes).store_slice(&mut self.corners.rows[3 * k + i][at..at + LANES]);
+            }
+        }
+        self.count += mask.count_ones() as usize;
+        self.count >= LANES
+    }
+
+    /// Drops the first [`LANES`] triangles.
+    #[inline(always)]
+    pub(super) fn take(&mut self) {
+        for row in &mut self.corners.rows {
+            row.copy_within(LANES.., 0);
+        }
+        self.count = self.count.saturating_sub(LANES);
+    }
 }
