@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use trixel::attributes::device::DeviceRows;
 use trixel::attributes::{AttributeRequest, Combine, VoxelAttributes};
-use trixel::{Job, Mesh, Mode, Strategy, VoxelOrder};
+use trixel::{Grid, Job, Mesh, Mode, Strategy, VoxelOrder};
 
 use crate::cutoff::Dilation;
 use crate::error::GpuError;
@@ -38,6 +38,7 @@ const GUESSED_FRAGMENTS: u64 = 3;
 /// The attributes of a volume's set voxels in buffers of a [`Gpu`], in the order of [`GpuVoxelList`] by x, y, z.
 #[derive(Debug)]
 pub struct GpuAttributes {
+    grid: Grid,
     request: AttributeRequest,
     row_words: u32,
     /// Rows in order, and how many.
@@ -49,6 +50,12 @@ pub struct GpuAttributes {
 }
 
 impl GpuAttributes {
+    /// The grid of the volume.
+    #[must_use]
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
     /// What was asked for.
     #[must_use]
     pub fn request(&self) -> &AttributeRequest {
@@ -170,6 +177,7 @@ pub(crate) fn compute(
     let sums: u64 = ranked.iter().map(|slab| slab.sums.bytes()).sum();
     let Work { memory, parts, counts, .. } = work;
     Ok(GpuAttributes {
+        grid: *volume.grid(),
         request: surface.request.clone(),
         row_words,
         parts,
