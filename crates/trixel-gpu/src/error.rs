@@ -81,9 +81,9 @@ pub enum GpuError {
     )]
     AttributesOfOthers {
         /// Voxels that the attributes are of.
-        attributes: u64,
+        attributes: u32,
         /// Voxels of the list.
-        list: u64,
+        list: u32,
     },
     /// The nodes that came back are not an octree's.
     #[error(transparent)]

@@ -1,8 +1,9 @@
 //! Octrees of the GPU with attributes against those of the CPU, bit for bit, and averages that are known.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a failure here is a failed test")]
+#![expect(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "a failure here is a failed test")]
 #![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "made-up numbers that fit")]
 
+use std::path::PathBuf;
 use std::sync::Mutex;
 
 use trixel::attributes::{AttributeKind, AttributeRequest, Combine, Described, compute};
@@ -18,6 +19,7 @@ use trixel_gpu::{
     AdapterChoice, Gpu, GpuAttributes, GpuError, GpuOctree, GpuSurface, GpuVolume, GpuVoxelList, ListMethod, Options,
     Voxelizer, wgpu,
 };
+use trixel_io::textures::decode_textures;
 
 const DRIVERS: [&str; 2] = ["llvmpipe", "SwiftShader"];
 
@@ -224,6 +226,24 @@ fn a_solid_keeps_its_shell_and_its_inside_collapses() {
         let inside = tree.find([32; 3], 2).unwrap();
         assert!(inside.full && inside.look.is_none(), "{inside:?}");
     }
+}
+
+#[test]
+fn a_textured_model_has_the_tree_of_the_cpu() {
+    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/models");
+    let folder = std::env::var_os("TRIXEL_MODELS").map_or(beside, PathBuf::from);
+    if !folder.is_dir() {
+        println!("no folder of real meshes: nothing to compare");
+        return;
+    }
+    let mut loaded = trixel_io::read::read_mesh(&folder.join("duck/Duck.glb"), &Default::default()).unwrap();
+    assert!(decode_textures(&mut loaded.mesh).is_empty());
+    let job = Job::new(Grid::fit(&loaded.mesh.bounds().unwrap(), 80).unwrap(), Mode::Conservative);
+    let volume = trixel::voxelize(&loaded.mesh, &job).unwrap();
+    let tree = compare(&open("llvmpipe"), &loaded.mesh, &job, &volume, &colors_and_normals());
+    // A yellow duck, also from afar.
+    let [red, green, blue, alpha] = tree.node_looks()[0].color;
+    assert!(red > 200 && green > 150 && blue < 100 && alpha == 255, "{:?}", tree.node_looks()[0]);
 }
 
 /// Two quads in the plane z = 2.5 that share no voxel, in x from 0 to 3 and from 4 to 7, of these materials.

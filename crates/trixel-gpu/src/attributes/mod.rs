@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use trixel::attributes::device::DeviceRows;
 use trixel::attributes::{AttributeRequest, Combine, VoxelAttributes};
-use trixel::{Grid, Job, Mesh, Mode, Strategy, VoxelOrder};
+use trixel::{Job, Mesh, Mode, Strategy, VoxelOrder};
 
 use crate::cutoff::Dilation;
 use crate::error::GpuError;
@@ -38,7 +38,7 @@ const GUESSED_FRAGMENTS: u64 = 3;
 /// The attributes of a volume's set voxels in buffers of a [`Gpu`], in the order of [`GpuVoxelList`] by x, y, z.
 #[derive(Debug)]
 pub struct GpuAttributes {
-    grid: Grid,
+    list: GpuVoxelList,
     request: AttributeRequest,
     row_words: u32,
     /// Rows in order, and how many.
@@ -50,10 +50,10 @@ pub struct GpuAttributes {
 }
 
 impl GpuAttributes {
-    /// The grid of the volume.
+    /// The voxels, in the order of the rows.
     #[must_use]
-    pub fn grid(&self) -> &Grid {
-        &self.grid
+    pub fn list(&self) -> &GpuVoxelList {
+        &self.list
     }
 
     /// What was asked for.
@@ -87,7 +87,7 @@ impl GpuAttributes {
         self.parts.iter().map(|(_, rows)| u64::from(*rows) * u64::from(self.row_words) * 4).sum()
     }
 
-    /// The most bytes that making them took at any time, beside rows, bits and [`GpuSurface`].
+    /// The most bytes that making them took at any time, beside rows, bits and [`GpuSurface`], with [`GpuAttributes::list`].
     #[must_use]
     pub fn scratch_bytes(&self) -> u64 {
         self.scratch_bytes
@@ -176,14 +176,15 @@ pub(crate) fn compute(
     }
     let sums: u64 = ranked.iter().map(|slab| slab.sums.bytes()).sum();
     let Work { memory, parts, counts, .. } = work;
+    let scratch_bytes = memory.most() + list.bytes() + sums;
     Ok(GpuAttributes {
-        grid: *volume.grid(),
+        list,
         request: surface.request.clone(),
         row_words,
         parts,
         counts,
         surface: job.mode() != Mode::Solid,
-        scratch_bytes: memory.most() + list.bytes() + sums,
+        scratch_bytes,
     })
 }
 

@@ -14,8 +14,8 @@ use crate::volume::{GpuVolume, Slab};
 
 pub(crate) use append::{append, appended};
 pub(crate) use scan::count;
-use sort::distinct;
-pub(crate) use sort::{SortKey, sort, sort_pairs};
+pub(crate) use sort::{SortKey, sort_pairs};
+use sort::{distinct, sort};
 
 /// How a list of the set voxels is made. All methods give the same list.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use trixel::VoxelOrder;
 use trixel::attributes::Combine;
 use trixel::attributes::device::NOTHING;
 
@@ -10,16 +9,11 @@ use crate::attributes::{GpuAttributes, Recipe};
 use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::kernel::{Bound, Dispatcher, Kernel};
-use crate::lists::{self, Entries, GpuVoxelList, Memory};
+use crate::lists::GpuVoxelList;
 
 /// What each voxel of a list along the Morton curve has: four words each, as `octree_leaf.wgsl` tells. The attributes are of
 /// the same voxels by x, y, z.
 pub(super) fn leaves(gpu: &Gpu, list: &GpuVoxelList, attributes: &GpuAttributes) -> Result<wgpu::Buffer, GpuError> {
-    let copied = Entries::new(gpu, list.len())?;
-    let mut copying = Dispatcher::new(gpu);
-    copying.copy((list.buffer(), 0), (&copied.buffer, 0), list.bytes());
-    copying.submit()?;
-    let sorted = lists::sort(gpu, copied, list.grid(), VoxelOrder::Xyz, &mut Memory::default())?;
     let (rows_of, ranges) = rows_of(attributes);
     let what = "the voxels' rows";
     gpu.check_storage(what, rows_of.len() as u64 * 4)?;
@@ -32,7 +26,7 @@ pub(super) fn leaves(gpu: &Gpu, list: &GpuVoxelList, attributes: &GpuAttributes)
     for ((rows, _), voxels) in attributes.rows().iter().zip(ranges).filter(|(_, voxels)| !voxels.is_empty()) {
         let parameters = [list.len(), voxels.start, voxels.end - voxels.start];
         let mut bound = vec![(0, Bound::Words(&parameters))];
-        let buffers = [list.buffer(), &sorted.buffer, &rows_of, rows, &leaves];
+        let buffers = [list.buffer(), attributes.list().buffer(), &rows_of, rows, &leaves];
         bound.extend((1..).zip(buffers.map(Bound::Buffer)));
         finding.dispatch(Kernel::FindLeaves(recipe), &bound, list.len())?;
     }
