@@ -1,6 +1,6 @@
 //! Octrees of the GPU with attributes against those of the CPU, bit for bit, and averages that are known.
 
-#![expect(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "a failure here is a failed test")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a failure here is a failed test")]
 #![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "made-up numbers that fit")]
 
 use std::path::PathBuf;
@@ -16,8 +16,8 @@ use trixel::{
     Volume, VoxelOrder, Wrap,
 };
 use trixel_gpu::{
-    AdapterChoice, Gpu, GpuAttributes, GpuError, GpuOctree, GpuSurface, GpuVolume, GpuVoxelList, ListMethod, Options,
-    Voxelizer, wgpu,
+    AdapterChoice, Gpu, GpuAttributes, GpuError, GpuOctree, GpuSurface, GpuVolume, GpuVoxelList, GridRay, ListMethod,
+    Options, Voxelizer, wgpu,
 };
 use trixel_io::textures::decode_textures;
 
@@ -225,6 +225,17 @@ fn a_solid_keeps_its_shell_and_its_inside_collapses() {
         assert!(2 * voxels < volume.count(), "{voxels} of {} voxels", volume.count());
         let inside = tree.find([32; 3], 2).unwrap();
         assert!(inside.full && inside.look.is_none(), "{inside:?}");
+        // Rays meet the shell, whose looks can be asked for at any level.
+        let gpu = open(driver);
+        let (_, _, on_gpu) = built(&gpu, &mesh, &job, &volume, &colors_and_normals());
+        let rays: Vec<_> = (0..64).map(|i| GridRay::new([-999, 256 * i + 77, 8200], [9, 1, 0]).unwrap()).collect();
+        let hits: Vec<_> = on_gpu.march(&gpu, &rays).unwrap().into_iter().flatten().map(|hit| hit.voxel).collect();
+        assert!(hits.len() > 40, "{} hits", hits.len());
+        for level in 0..4 {
+            let cells = on_gpu.find(&gpu, &hits, level).unwrap();
+            assert!(cells.iter().all(|cell| cell.is_some_and(|cell| cell.look.is_some())));
+            assert!(cells.iter().zip(&hits).all(|(cell, voxel)| *cell == tree.find(*voxel, level)));
+        }
     }
 }
 

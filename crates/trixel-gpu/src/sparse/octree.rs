@@ -181,8 +181,9 @@ impl Levels {
 
     /// How many of so many voxels are in nodes of the last level: full cubes have eight each.
     fn voxels(&self, all: u32) -> u32 {
-        let full = self.levels.first().zip(self.counts.first()).map_or(0, |(level, count)| level.cubes.length - count);
-        all - 8 * full
+        let full = |(level, count): (&Level, &u32)| level.cubes.length.saturating_sub(*count);
+        let full = self.levels.first().zip(self.counts.first()).map_or(0, full);
+        all.saturating_sub(8 * full)
     }
 
     /// Every level from the root's down, and `Level` of `octree_level.wgsl`; whether it is the last.
