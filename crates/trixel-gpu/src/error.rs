@@ -75,6 +75,16 @@ pub enum GpuError {
         "octrees and brick maps are built from lists along the Morton curve; make the list with `VoxelOrder::Morton`"
     )]
     ListOrder,
+    /// Attributes of other voxels than a list's.
+    #[error(
+        "the attributes are of {attributes} voxels and the list has {list}, or their grids differ; make both of one volume"
+    )]
+    AttributesOfOthers {
+        /// Voxels that the attributes are of.
+        attributes: u32,
+        /// Voxels of the list.
+        list: u32,
+    },
     /// The nodes that came back are not an octree's.
     #[error(transparent)]
     Octree(#[from] trixel::octree::OctreeError),

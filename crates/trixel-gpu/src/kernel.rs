@@ -14,6 +14,7 @@ use crate::limits::WORKGROUP;
 use crate::lists::SortKey;
 use crate::material_volume::Precision;
 use crate::shader::shader;
+use crate::sparse::Below;
 
 /// A function of a shader, with the constants in front of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -30,11 +31,17 @@ pub(crate) enum Kernel {
     CountDistinct,
     WriteDistinct,
     MarkCubes,
-    /// Of single voxels, or of the cubes of a level.
-    GatherOctants {
-        voxels: bool,
+    GatherOctants(Below),
+    FindLeaves(Recipe),
+    /// Of voxels with attributes, or of the cubes of a level.
+    SumOctants {
+        leaves: bool,
     },
-    WriteNodes,
+    WriteNodes {
+        leaves: bool,
+    },
+    WriteNodeLooks,
+    WriteVoxelLooks,
     WriteBricks,
     Answer,
     MarchOctree,
@@ -75,6 +82,7 @@ impl Kernel {
                 Self::GatherPairs(recipe),
                 Self::WriteFragmentRows(recipe),
                 Self::CopyCounts(recipe),
+                Self::FindLeaves(recipe),
             ]
         });
         let others = [
@@ -88,9 +96,15 @@ impl Kernel {
             Self::CountDistinct,
             Self::WriteDistinct,
             Self::MarkCubes,
-            Self::GatherOctants { voxels: true },
-            Self::GatherOctants { voxels: false },
-            Self::WriteNodes,
+            Self::GatherOctants(Below::Voxels),
+            Self::GatherOctants(Below::Leaves),
+            Self::GatherOctants(Below::Cubes),
+            Self::SumOctants { leaves: false },
+            Self::SumOctants { leaves: true },
+            Self::WriteNodes { leaves: false },
+            Self::WriteNodes { leaves: true },
+            Self::WriteNodeLooks,
+            Self::WriteVoxelLooks,
             Self::WriteBricks,
             Self::Answer,
             Self::MarchOctree,
@@ -122,8 +136,12 @@ impl Kernel {
             Self::CountDistinct => "count_distinct",
             Self::WriteDistinct => "write_distinct",
             Self::MarkCubes => "mark_cubes",
-            Self::GatherOctants { .. } => "gather_octants",
-            Self::WriteNodes => "write_nodes",
+            Self::GatherOctants(_) => "gather_octants",
+            Self::FindLeaves(_) => "find_leaves",
+            Self::SumOctants { .. } => "sum_octants",
+            Self::WriteNodes { .. } => "write_nodes",
+            Self::WriteNodeLooks => "write_node_looks",
+            Self::WriteVoxelLooks => "write_voxel_looks",
             Self::WriteBricks => "write_bricks",
             Self::Answer => "answer",
             Self::MarchOctree | Self::MarchBricks => "march_rays",
@@ -151,18 +169,34 @@ impl Kernel {
             Self::CountDigits(_) | Self::MoveEntries(_) => shader!("numbering" "entry" "sort_key" "radix_sort"),
             Self::CountDistinct | Self::WriteDistinct => shader!("numbering" "merge"),
             Self::MarkCubes => shader!("numbering" "entry" "sparse"),
-            Self::GatherOctants { voxels: true } => {
+            Self::GatherOctants(Below::Voxels) => {
                 shader!("numbering" "entry" "sparse" "octree_on_voxels" "octree")
             }
-            Self::GatherOctants { voxels: false } => {
+            Self::GatherOctants(Below::Leaves) => {
+                shader!("numbering" "entry" "sparse" "octree_leaf" "octree_on_leaves" "octree")
+            }
+            Self::GatherOctants(Below::Cubes) => {
                 shader!("numbering" "entry" "sparse" "octree_on_cubes" "octree")
             }
-            Self::WriteNodes => shader!("numbering" "octree_nodes"),
+            Self::FindLeaves(_) => shader!("numbering" "octree_leaf" "octree_leaves"),
+            Self::SumOctants { leaves: true } => shader!(
+                "product_portable" "wide" "division" "numbering" "entry" "sparse" "octree_light" "light" "octree_leaf"
+                "octree_sum" "octree_sums_of_leaves" "octree_sums"
+            ),
+            Self::SumOctants { leaves: false } => shader!(
+                "product_portable" "wide" "division" "numbering" "entry" "sparse" "octree_light" "light" "octree_leaf"
+                "octree_sum" "octree_sums_of_cubes" "octree_sums"
+            ),
+            Self::WriteNodes { .. } => shader!("numbering" "octree_level" "octree_nodes"),
+            Self::WriteNodeLooks | Self::WriteVoxelLooks => shader!(
+                "product_portable" "wide" "division" "numbering" "octree_light" "light" "octree_leaf" "octree_sum"
+                "octree_level" "octree_looks"
+            ),
             Self::WriteBricks => shader!("numbering" "entry" "sparse" "bricks"),
-            Self::Answer => shader!("numbering" "entry" "octree_query"),
-            Self::MarchOctree => {
-                shader!("product_portable" "wide" "division" "numbering" "entry" "march" "octree_cell")
-            }
+            Self::Answer => shader!("numbering" "entry" "octree_query" "octree_descent"),
+            Self::MarchOctree => shader!(
+                "product_portable" "wide" "division" "numbering" "entry" "march" "octree_descent" "octree_cell"
+            ),
             Self::MarchBricks => {
                 shader!("product_portable" "wide" "division" "numbering" "entry" "sort_key" "march" "brick_cell")
             }
@@ -203,7 +237,9 @@ impl Kernel {
             | Self::WriteVoxelRows(recipe)
             | Self::GatherPairs(recipe)
             | Self::WriteFragmentRows(recipe)
-            | Self::CopyCounts(recipe) => recipe.constants(),
+            | Self::CopyCounts(recipe)
+            | Self::FindLeaves(recipe) => recipe.constants(),
+            Self::WriteNodes { leaves } => format!("const LEAVES: bool = {leaves};\n"),
             _ => String::new(),
         };
         [&[constants.as_str()], self.files()].concat().join("\n")

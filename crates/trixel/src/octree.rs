@@ -25,11 +25,15 @@ pub struct Node {
     pub some: u8,
     /// The octants that are full.
     pub full: u8,
-    /// Where the nodes of the octants that are neither begin; on the last level, where their voxels' attributes begin.
+    /// Where the nodes of the octants that are neither begin; on the last level, where their voxels' looks begin, or 0
+    /// without attributes.
     pub first: u32,
 }
 
 /// What a voxel, or a cube on average, looks like.
+///
+/// Averages are of the voxels that have attributes, each counting the same, colours by their alpha: sums of integers, so that
+/// every device finds the same. Without colours they are white, and without normals these are 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Look {
     /// sRGB colour and alpha.
@@ -110,6 +114,16 @@ pub enum OctreeError {
     /// Nodes that are no octree's.
     #[error("node {0} of the octree's nodes is not what the nodes before it call for")]
     Nodes(usize),
+    /// Looks that are not those of as many nodes and voxels.
+    #[error("the octree has {needed} {of}, and there are looks of {given}; give one of each")]
+    Looks {
+        /// Nodes or voxels.
+        of: &'static str,
+        /// How many looks there are.
+        given: usize,
+        /// How many there should be.
+        needed: usize,
+    },
     /// The attributes are of another volume.
     #[error("the attributes describe another grid; compute them for this volume")]
     GridMismatch,
@@ -185,36 +199,40 @@ impl Octree {
     /// # Errors
     /// When the nodes are not those that [`Octree::new`] would make.
     pub fn from_nodes(grid: Grid, nodes: Vec<Node>, everything: bool) -> Result<Self, OctreeError> {
-        let height = height_of(&grid);
-        let mut levels = vec![0];
-        let mut end = usize::from(!nodes.is_empty());
-        for level in (1..=height).rev() {
-            let start = *levels.last().unwrap_or(&0);
-            let mut next = end;
-            for (index, node) in nodes.iter().enumerate().take(end).skip(start) {
-                let first = if level == 1 { 0 } else { next };
-                let full = if level == 1 { node.some } else { node.full };
-                let fits = node.some != 0 && node.full != u8::MAX && node.full & !node.some == 0 && node.full == full;
-                if !fits || node.first as usize != first {
-                    return Err(OctreeError::Nodes(index));
-                }
-                next += (node.some & !node.full).count_ones() as usize;
-            }
-            if end > nodes.len() {
-                return Err(OctreeError::Nodes(nodes.len()));
-            }
-            levels.push(end);
-            end = next;
+        let (levels, _) = levels_of(&grid, &nodes, false)?;
+        Ok(Self::assembled(grid, nodes, levels, everything))
+    }
+
+    /// An octree with attributes that was built elsewhere: nodes as for [`Octree::from_nodes`], what each of them looks like,
+    /// and what the voxels of the last level's nodes look like, as [`Octree::node_looks`] and [`Octree::voxel_looks`] have
+    /// them.
+    ///
+    /// # Errors
+    /// When the nodes are not those that [`Octree::new`] would make, or the looks are not as many as the nodes call for. The
+    /// looks themselves are taken as they are.
+    pub fn from_nodes_and_looks(
+        grid: Grid,
+        nodes: Vec<Node>,
+        everything: bool,
+        node_looks: Vec<Look>,
+        voxel_looks: Vec<Look>,
+    ) -> Result<Self, OctreeError> {
+        let (levels, voxels) = levels_of(&grid, &nodes, true)?;
+        let counts = [("nodes", node_looks.len(), nodes.len()), ("voxels in nodes", voxel_looks.len(), voxels)];
+        if let Some((of, given, needed)) = counts.into_iter().find(|(_, given, needed)| given != needed) {
+            return Err(OctreeError::Looks { of, given, needed });
         }
-        if end != nodes.len() {
-            return Err(OctreeError::Nodes(end));
-        }
+        Ok(Self { node_looks, voxel_looks, ..Self::assembled(grid, nodes, levels, everything) })
+    }
+
+    fn assembled(grid: Grid, nodes: Vec<Node>, levels: Vec<usize>, everything: bool) -> Self {
         let root = match (nodes.is_empty(), everything) {
             (false, _) => Content::Some,
             (true, false) => Content::Nothing,
             (true, true) => Content::Everything,
         };
-        Ok(Self { grid, height, root, nodes, levels, node_looks: Vec::new(), voxel_looks: Vec::new() })
+        let height = height_of(&grid);
+        Self { grid, height, root, nodes, levels, node_looks: Vec::new(), voxel_looks: Vec::new() }
     }
 
     /// Averages the voxels' attributes upwards; pruned cubes have none.
@@ -250,6 +268,19 @@ impl Octree {
     #[must_use]
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
+    }
+
+    /// With attributes, what each of the [`Octree::nodes`] looks like on average.
+    #[must_use]
+    pub fn node_looks(&self) -> &[Look] {
+        &self.node_looks
+    }
+
+    /// With attributes, what the voxels of the last level's nodes look like, those of a node from [`Node::first`] on; 0
+    /// throughout where a voxel has no attributes.
+    #[must_use]
+    pub fn voxel_looks(&self) -> &[Look] {
+        &self.voxel_looks
     }
 
     /// Bytes that the tree takes.
@@ -402,6 +433,40 @@ impl Octree {
 fn height_of(grid: &Grid) -> u32 {
     let longest = grid.dims().into_iter().max().unwrap_or(1);
     longest.next_power_of_two().trailing_zeros().max(1)
+}
+
+/// Checks nodes level by level: where each level begins, and how many voxels the last one has. With attributes its nodes say
+/// where these voxels' looks begin, and may have all octants.
+fn levels_of(grid: &Grid, nodes: &[Node], looks: bool) -> Result<(Vec<usize>, usize), OctreeError> {
+    let mut levels = vec![0];
+    let mut end = usize::from(!nodes.is_empty());
+    let mut voxels = 0;
+    for level in (1..=height_of(grid)).rev() {
+        let start = *levels.last().unwrap_or(&0);
+        let mut next = end;
+        for (index, node) in nodes.iter().enumerate().take(end).skip(start) {
+            let (first, full) = match level {
+                1 => (if looks { voxels } else { 0 }, node.some),
+                _ => (next, node.full),
+            };
+            let pruned = node.full == u8::MAX && !(looks && level == 1);
+            let fits = node.some != 0 && !pruned && node.full & !node.some == 0 && node.full == full;
+            if !fits || node.first as usize != first {
+                return Err(OctreeError::Nodes(index));
+            }
+            next += (node.some & !node.full).count_ones() as usize;
+            voxels += if level == 1 { node.some.count_ones() as usize } else { 0 };
+        }
+        if end > nodes.len() {
+            return Err(OctreeError::Nodes(nodes.len()));
+        }
+        levels.push(end);
+        end = next;
+    }
+    if end != nodes.len() {
+        return Err(OctreeError::Nodes(end));
+    }
+    Ok((levels, voxels))
 }
 
 /// A ray in voxels.
@@ -574,11 +639,7 @@ impl Sum {
             _ => [0.0; 3],
         };
         let shown = [r, g, b].map(|c| u64::from(light::multiply(c, alpha)));
-        Self {
-            voxels: 1,
-            color: [shown[0], shown[1], shown[2], u64::from(alpha)],
-            normal: vector::quantized(normal.map(f64::from)).unwrap_or_default(),
-        }
+        Self { voxels: 1, color: [shown[0], shown[1], shown[2], u64::from(alpha)], normal: vector::integers(normal) }
     }
 
     fn plus(self, other: &Self) -> Self {
@@ -764,6 +825,37 @@ mod tests {
         // Top octants of the sphere look up.
         let top = tree.cells(4).into_iter().filter(|cell| cell.cell[2] == 3).filter_map(|cell| cell.look);
         assert!(top.map(|look| look.normal[2]).all(|z| z > 0.3));
+    }
+
+    #[test]
+    fn trees_with_looks_are_checked() {
+        let mut mesh = scene::build("sphere:3").unwrap();
+        mesh.materials = vec![Material { base_color: [0.0, 0.5, 1.0, 1.0], ..Material::default() }];
+        mesh.triangle_materials = vec![0; mesh.triangles.len()];
+        let job = Job::new(Grid::fit(&mesh.bounds().unwrap(), 20).unwrap(), Mode::Solid);
+        let volume = voxelize(&mesh, &job).unwrap();
+        let lattice = LatticeMesh::snap(&mesh, job.grid()).unwrap();
+        let request = AttributeRequest::new(&[AttributeKind::Color], Combine::Mean);
+        let attributes = compute(&mesh, &lattice, &job, &volume, &request).unwrap();
+        let rank = Rank::new(&volume);
+        let tree = Octree::new(&volume, Described::new(&rank, &attributes).as_ref()).unwrap();
+        let built = |nodes: &[Node], node_looks: &[Look], voxel_looks: &[Look]| {
+            let [node_looks, voxel_looks] = [node_looks, voxel_looks].map(<[_]>::to_vec);
+            Octree::from_nodes_and_looks(*job.grid(), nodes.to_vec(), false, node_looks, voxel_looks)
+        };
+        let (nodes, node_looks, voxel_looks) = (tree.nodes(), tree.node_looks(), tree.voxel_looks());
+        assert_eq!(built(nodes, node_looks, voxel_looks).as_ref(), Ok(&tree));
+        let (given, needed) = (nodes.len() - 1, nodes.len());
+        let fewer = built(nodes, &node_looks[1..], voxel_looks);
+        assert_eq!(fewer, Err(OctreeError::Looks { of: "nodes", given, needed }));
+        let fewer = built(nodes, node_looks, &voxel_looks[1..]);
+        assert!(matches!(fewer, Err(OctreeError::Looks { of: "voxels in nodes", .. })));
+        // Its last nodes point to looks, and some have all octants, which bare ones never do.
+        assert!(matches!(Octree::from_nodes(*job.grid(), nodes.to_vec(), false), Err(OctreeError::Nodes(_))));
+        assert!(nodes.iter().any(|node| node.full == u8::MAX));
+        let mut wrong = nodes.to_vec();
+        wrong[needed - 1].first += 1;
+        assert_eq!(built(&wrong, node_looks, voxel_looks), Err(OctreeError::Nodes(needed - 1)));
     }
 
     #[test]

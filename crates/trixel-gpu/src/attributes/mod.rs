@@ -38,6 +38,7 @@ const GUESSED_FRAGMENTS: u64 = 3;
 /// The attributes of a volume's set voxels in buffers of a [`Gpu`], in the order of [`GpuVoxelList`] by x, y, z.
 #[derive(Debug)]
 pub struct GpuAttributes {
+    list: GpuVoxelList,
     request: AttributeRequest,
     row_words: u32,
     /// Rows in order, and how many.
@@ -49,6 +50,12 @@ pub struct GpuAttributes {
 }
 
 impl GpuAttributes {
+    /// The voxels, in the order of the rows.
+    #[must_use]
+    pub fn list(&self) -> &GpuVoxelList {
+        &self.list
+    }
+
     /// What was asked for.
     #[must_use]
     pub fn request(&self) -> &AttributeRequest {
@@ -80,7 +87,7 @@ impl GpuAttributes {
         self.parts.iter().map(|(_, rows)| u64::from(*rows) * u64::from(self.row_words) * 4).sum()
     }
 
-    /// The most bytes that making them took at any time, beside rows, bits and [`GpuSurface`].
+    /// The most bytes that making them took at any time, beside rows, bits and [`GpuSurface`], with [`GpuAttributes::list`].
     #[must_use]
     pub fn scratch_bytes(&self) -> u64 {
         self.scratch_bytes
@@ -169,13 +176,15 @@ pub(crate) fn compute(
     }
     let sums: u64 = ranked.iter().map(|slab| slab.sums.bytes()).sum();
     let Work { memory, parts, counts, .. } = work;
+    let scratch_bytes = memory.most() + list.bytes() + sums;
     Ok(GpuAttributes {
+        list,
         request: surface.request.clone(),
         row_words,
         parts,
         counts,
         surface: job.mode() != Mode::Solid,
-        scratch_bytes: memory.most() + list.bytes() + sums,
+        scratch_bytes,
     })
 }
 

@@ -1,10 +1,10 @@
 // One level of a sparse octree: the twin of `octree.rs`, which has the definition of the nodes. What is below it, voxels or
-// cubes, is told by `octree_on_voxels.wgsl` or `octree_on_cubes.wgsl`.
+// cubes, is told by `octree_on_voxels.wgsl`, `octree_on_leaves.wgsl` or `octree_on_cubes.wgsl`.
 
 const FULL: u32 = 0xffu;
 
 @group(0) @binding(5) var<storage, read_write> cubes: array<vec2<u32>>;
-// Of this level's cubes: as above, and how many mixed cubes below come before their first child.
+// Of this level's cubes: the octants with voxels, above them the full ones, and what `mixed_before` says of the first child.
 @group(0) @binding(6) var<storage, read_write> masks: array<vec2<u32>>;
 // 1 for the cubes of this level that are neither empty nor full.
 @group(0) @binding(7) var<storage, read_write> mixed: array<u32>;
@@ -20,12 +20,9 @@ fn gather_octants(
     if i >= sparse.entries || !is_first(i) {
         return;
     }
-    let cube = cube_of(i);
     var octants = 0u;
-    for (var child = i; child < min(i + 8u, sparse.entries); child++) {
-        if any(cube_of(child) != cube) {
-            break;
-        }
+    let end = end_of_eight(i);
+    for (var child = i; child < end; child++) {
         let half = voxel_of(list[child]) & vec3<u32>(1u);
         let octant = (half.x << 2u) | (half.y << 1u) | half.z;
         octants |= 1u << octant;
@@ -34,7 +31,7 @@ fn gather_octants(
         }
     }
     let place = begun[i];
-    cubes[place] = entry_of(cube);
+    cubes[place] = entry_of(cube_of(i));
     masks[place] = vec2<u32>(octants, mixed_before(i));
     mixed[place] = select(1u, 0u, (octants >> 8u) == FULL);
 }

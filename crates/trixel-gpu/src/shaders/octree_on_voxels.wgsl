@@ -1,4 +1,4 @@
-// The last level of an octree: its octants are voxels, which are all full and have no nodes.
+// The last level of an octree without attributes: its octants are voxels, which are all full and have no nodes.
 
 fn is_full(child: u32) -> bool {
     return true;

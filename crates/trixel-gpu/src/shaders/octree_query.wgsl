@@ -1,4 +1,4 @@
-// Questions to an octree of the GPU, without a stack: the twin of `Octree::get` in `octree.rs`.
+// Questions to an octree of the GPU: what is at voxels, down to a level of detail.
 
 struct Tree {
     // The root's cube is 2^height voxels wide.
@@ -7,31 +7,18 @@ struct Tree {
     everything: u32,
     nodes: u32,
     questions: u32,
+    // At most the height.
+    level: u32,
 }
 
 @group(0) @binding(0) var<uniform> tree: Tree;
-@group(0) @binding(1) var<storage, read> nodes: array<vec2<u32>>;
-@group(0) @binding(2) var<storage, read> questions: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read_write> answers: array<u32>;
-
-fn is_set(voxel: vec3<u32>) -> bool {
-    if any(voxel >= vec3<u32>(1u << tree.height)) {
-        return false;
-    }
-    var node = 0u;
-    var found = tree.everything != 0u;
-    var there = tree.nodes > 0u;
-    for (var level = tree.height; there && level > 0u; level--) {
-        let half = (voxel >> vec3<u32>(level - 1u)) & vec3<u32>(1u);
-        let octant = 1u << ((half.x << 2u) | (half.y << 1u) | half.z);
-        let some = nodes[node].x & 0xffu;
-        let full = nodes[node].x >> 8u;
-        found = (full & octant) != 0u;
-        there = (some & ~full & octant) != 0u;
-        node = nodes[node].y + countOneBits(some & ~full & (octant - 1u));
-    }
-    return found;
-}
+// Voxels, as entries; what is asked beyond the root's cube, nobody reads the answer to.
+@group(0) @binding(1) var<storage, read> questions: array<vec2<u32>>;
+// Five words each: what the cube holds, then its look.
+@group(0) @binding(2) var<storage, read_write> answers: array<u32>;
+// Of trees without attributes one of each, which nobody reads.
+@group(0) @binding(4) var<storage, read> node_looks: array<vec4<u32>>;
+@group(0) @binding(5) var<storage, read> voxel_looks: array<vec4<u32>>;
 
 @compute @workgroup_size(WORKGROUP)
 fn answer(
@@ -40,7 +27,19 @@ fn answer(
     @builtin(local_invocation_index) local: u32,
 ) {
     let i = invocation(group, groups, local);
-    if i < tree.questions {
-        answers[i] = select(0u, 1u, is_set(voxel_of(questions[i])));
+    if i >= tree.questions {
+        return;
     }
+    let found = descend(voxel_of(questions[i]), tree.level);
+    var look = vec4<u32>(0u);
+    if found.content == MIXED {
+        look = node_looks[min(found.index, arrayLength(&node_looks) - 1u)];
+    } else if found.content == FULL && found.level == 0u {
+        look = voxel_looks[min(found.index, arrayLength(&voxel_looks) - 1u)];
+    }
+    answers[5u * i] = found.content;
+    answers[5u * i + 1u] = look.x;
+    answers[5u * i + 2u] = look.y;
+    answers[5u * i + 3u] = look.z;
+    answers[5u * i + 4u] = look.w;
 }

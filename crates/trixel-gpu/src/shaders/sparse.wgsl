@@ -20,6 +20,17 @@ fn is_first(i: u32) -> bool {
     return i == 0u || any(cube_of(i) != cube_of(max(i, 1u) - 1u));
 }
 
+// One past the last entry of the cube of eight whose first is entry i.
+fn end_of_eight(i: u32) -> u32 {
+    let cube = cube_of(i);
+    let most = min(i + 8u, sparse.entries);
+    var end = i + 1u;
+    while end < most && all(cube_of(end) == cube) {
+        end++;
+    }
+    return end;
+}
+
 @compute @workgroup_size(WORKGROUP)
 fn mark_cubes(
     @builtin(workgroup_id) group: vec3<u32>,

@@ -99,7 +99,8 @@ fn march(
 }
 
 impl GpuOctree {
-    /// Where each ray enters the first set voxel; the hits of [`trixel::octree::Octree::march`].
+    /// Where each ray enters the first set voxel; the hits of [`trixel::octree::Octree::march`]. What is there looks like
+    /// [`GpuOctree::find`] says, at any level of detail.
     ///
     /// # Errors
     /// When there are more rays than the adapter binds, memory runs out or the device is lost.

@@ -1,11 +1,14 @@
 //! Sparse structures on the GPU, built from a list along the Morton curve and equal to the CPU's.
 
 mod bricks;
+mod leaves;
 mod march;
 mod octree;
+mod query;
 
 pub use bricks::GpuBrickMap;
 pub use march::GridRay;
+pub(crate) use octree::Below;
 pub use octree::GpuOctree;
 use octree::height_of;
 

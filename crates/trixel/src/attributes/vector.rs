@@ -42,6 +42,12 @@ pub(crate) fn floats(v: [i64; 3]) -> [f32; 3] {
     v.map(|c| c as f32 / UNIT as f32)
 }
 
+/// The quantized direction that [`floats`] made these of.
+pub(crate) fn integers(v: [f32; 3]) -> [i64; 3] {
+    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "whole numbers of 16 bits")]
+    v.map(|c| (c * UNIT as f32) as i64)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,6 +67,13 @@ mod tests {
             for i in 0..3 {
                 assert!((f64::from(n[i]) - exact[i] / exact_length).abs() < 2e-4, "{v:?} {n:?}");
             }
+        }
+    }
+
+    #[test]
+    fn floats_hold_the_integers() {
+        for c in -UNIT..=UNIT {
+            assert_eq!(integers(floats([c, 0, -c])), [c, 0, -c]);
         }
     }
 
