@@ -29,16 +29,45 @@ pub(super) fn columns<V: Simd>(corners: &Vectors<V>, clip: &NearClip<V>) -> [[i3
 }
 
 /// Sends the runs, from the lowest voxel whose centre is not below the triangle to the top of the clip, of the waiting
-/// triangles, at most [`LANES`].
+/// triangles: of as many as fill vectors, or of all.
 #[inline(always)]
-pub(super) fn flush<V: Simd>(simd: V, waiting: &mut Queue, near: &NearClip<V>, clip: &VoxelBox, sink: &mut impl Sink) {
-    let corners = waiting.vectors(simd);
-    let [[x, x_last], [y, y_last]] = columns(&corners, near);
+pub(super) fn flush<V: Simd>(
+    simd: V,
+    waiting: &mut Queue,
+    all: bool,
+    near: &NearClip<V>,
+    clip: &VoxelBox,
+    sink: &mut impl Sink,
+) {
+    let mut first = 0;
+    loop {
+        let count = waiting.lanes(first, all);
+        if count == 0 {
+            break;
+        }
+        let corners = waiting.vectors(simd, first);
+        cross_columns(simd, &corners, count, near, clip, sink);
+        first += LANES;
+    }
+    waiting.keep(simd, first);
+}
+
+/// [`flush`] of the first `count` lanes.
+#[inline(always)]
+fn cross_columns<V: Simd>(
+    simd: V,
+    corners: &Vectors<V>,
+    count: usize,
+    near: &NearClip<V>,
+    clip: &VoxelBox,
+    sink: &mut impl Sink,
+) {
+    let [[x, x_last], [y, y_last]] = columns(corners, near);
     let z = (corners.least(2) - 1) >> STEP_BITS;
     let middle = [(x << STEP_BITS) + HALF, (y << STEP_BITS) + HALF, (z << STEP_BITS) + HALF];
-    let halves = corners.floats(simd, middle, 1.0);
+    let halves = corners.halves(simd, middle, 1.0);
     let second = [x.simd_lt(x_last).to_bitmask(), y.simd_lt(y_last).to_bitmask()];
-    let used = (1u64 << waiting.count().min(LANES)) - 1;
+    let used = (1u64 << count) - 1;
 
     let mut at = [[0; LANES]; 3];
     for (axis, low) in [x, y, z].into_iter().enumerate() {
@@ -76,7 +105,6 @@ pub(super) fn flush<V: Simd>(simd: V, waiting: &mut Queue, near: &NearClip<V>, c
             }
         }
     }
-    waiting.take();
 }
 
 /// What the columns of eight triangles have in common.

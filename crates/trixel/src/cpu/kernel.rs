@@ -92,7 +92,7 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
             if two != 0 && waiting.twos.push(simd, &corners, two) {
                 simd.vectorize(
                     #[inline(always)]
-                    || tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, &near, sink),
+                    || tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, false, &near, sink),
                 );
             }
             tiny &= !two;
@@ -104,7 +104,7 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
                     if flat != 0 && waiting.flats.push(simd, &corners, flat) {
                         simd.vectorize(
                             #[inline(always)]
-                            || tiny::flush_flats(simd, rule, &mut waiting.flats, &near, sink),
+                            || tiny::flush_flats(simd, rule, &mut waiting.flats, false, &near, sink),
                         );
                     }
                     rest &= !flat;
@@ -113,14 +113,14 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
                 if three != 0 && waiting.threes.push(simd, &corners, three) {
                     simd.vectorize(
                         #[inline(always)]
-                        || tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, &near, sink),
+                        || tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, false, &near, sink),
                     );
                 }
                 let four = rest & !three;
                 if four != 0 && waiting.fours.push(simd, &corners, four) {
                     simd.vectorize(
                         #[inline(always)]
-                        || tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, &near, sink),
+                        || tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, false, &near, sink),
                     );
                 }
             }
@@ -142,10 +142,10 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
             }
         },
     );
-    tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, &near, sink);
-    tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, &near, sink);
-    tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, &near, sink);
-    tiny::flush_flats(simd, rule, &mut waiting.flats, &near, sink);
+    tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, true, &near, sink);
+    tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, true, &near, sink);
+    tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, true, &near, sink);
+    tiny::flush_flats(simd, rule, &mut waiting.flats, true, &near, sink);
 }
 
 /// Calls `each` with the number of the first, the corners and the used lanes of every vector of triangles.
@@ -262,7 +262,7 @@ pub(super) fn solid<V: Simd>(simd: V, rule: &Solid, triangles: Selected<'_>, cli
             if tiny != 0 && waiting.push(simd, &corners, tiny) {
                 simd.vectorize(
                     #[inline(always)]
-                    || crossings::flush(simd, &mut waiting, &near, clip, sink),
+                    || crossings::flush(simd, &mut waiting, false, &near, clip, sink),
                 );
             }
             for lane in set_bits(some & !tiny) {
@@ -270,7 +270,7 @@ pub(super) fn solid<V: Simd>(simd: V, rule: &Solid, triangles: Selected<'_>, cli
             }
         },
     );
-    crossings::flush(simd, &mut waiting, &near, clip, sink);
+    crossings::flush(simd, &mut waiting, true, &near, clip, sink);
 }
 
 /// Sends the voxels of mode sliced inside `clip` to `sink`.

@@ -2,6 +2,7 @@
 //!
 //! - `kernel`: one triangle after the other, each to the path for its size
 //! - `tiny`, `crossings`, `rows`, `large`: the paths
+//! - `filter`: the tests of `tiny` in f32, and where they need to be repeated exactly
 //! - `instructions`: the vector instructions they are compiled for
 //! - `setup`: what paths compute first
 //! - `rule`: the modes as thresholds
@@ -14,6 +15,7 @@
 //! - `pillars`: a sparse grid cut into pillars of bricks
 
 mod crossings;
+mod filter;
 pub(crate) mod fragments;
 mod instructions;
 mod kernel;

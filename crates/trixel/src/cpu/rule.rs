@@ -41,10 +41,10 @@ pub(super) trait Rule: Copy + Send + Sync {
 pub(super) trait SurfaceRule: Rule {
     /// How far beyond an edge's line a voxel's centre passes, for the absolute values of the edge's normal in a
     /// projection: times half a voxel.
-    fn centre_reach<V: Simd>(&self, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V>;
+    fn centre_reach<V: Simd, F: SimdFloat<V>>(&self, na: F, nb: F) -> F;
 
     /// How far from the plane a voxel's centre passes, for the absolute values of the normal: times half a voxel.
-    fn centre_plane_reach<V: Simd>(&self, n: [f64x8<V>; 3]) -> f64x8<V>;
+    fn centre_plane_reach<V: Simd, F: SimdFloat<V>>(&self, n: [F; 3]) -> F;
 
     /// `(d1, d2)` for the normal `n`, oriented either way, and the corner `v0`, at most 2^18 in each coordinate.
     fn plane_bounds<V: Simd>(&self, simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>);
@@ -108,12 +108,12 @@ impl Rule for Conservative {
 
 impl SurfaceRule for Conservative {
     #[inline(always)]
-    fn centre_reach<V: Simd>(&self, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V> {
+    fn centre_reach<V: Simd, F: SimdFloat<V>>(&self, na: F, nb: F) -> F {
         na + nb
     }
 
     #[inline(always)]
-    fn centre_plane_reach<V: Simd>(&self, n: [f64x8<V>; 3]) -> f64x8<V> {
+    fn centre_plane_reach<V: Simd, F: SimdFloat<V>>(&self, n: [F; 3]) -> F {
         n[0] + n[1] + n[2]
     }
 
@@ -151,12 +151,12 @@ impl Rule for Thin {
 
 impl SurfaceRule for Thin {
     #[inline(always)]
-    fn centre_reach<V: Simd>(&self, na: f64x8<V>, nb: f64x8<V>) -> f64x8<V> {
+    fn centre_reach<V: Simd, F: SimdFloat<V>>(&self, na: F, nb: F) -> F {
         na.max(nb)
     }
 
     #[inline(always)]
-    fn centre_plane_reach<V: Simd>(&self, n: [f64x8<V>; 3]) -> f64x8<V> {
+    fn centre_plane_reach<V: Simd, F: SimdFloat<V>>(&self, n: [F; 3]) -> F {
         n[0].max(n[1]).max(n[2])
     }
 

@@ -1,6 +1,6 @@
 //! Which triangles the kernel is to go through, and their corners: one by one, or in blocks for vectors.
 
-use fearless_simd::{Simd, f64x8, i32x16, prelude::*};
+use fearless_simd::{Simd, f32x16, f64x8, i32x16, prelude::*};
 
 use super::kernel::VoxelBox;
 use crate::lattice::{LatticeMesh, LatticePositions, STEP_BITS};
@@ -111,15 +111,20 @@ impl<const N: usize> Corners<N> {
     /// The corners of the [`LANES`] triangles from `first` on.
     #[inline(always)]
     pub(super) fn vectors<V: Simd>(&self, simd: V, first: usize) -> Vectors<V> {
-        let zero = i32x16::splat(simd, 0);
-        let mut corners = [[zero; 3]; 3];
-        for k in 0..3 {
-            for i in 0..3 {
-                corners[k][i] = i32x16::from_slice(simd, &self.rows[3 * k + i][first..first + LANES]);
-            }
-        }
-        Vectors(corners)
+        let rows = &self.rows;
+        // Written out, because arrays filled in loops are kept in memory and copied.
+        Vectors([
+            [row(simd, &rows[0], first), row(simd, &rows[1], first), row(simd, &rows[2], first)],
+            [row(simd, &rows[3], first), row(simd, &rows[4], first), row(simd, &rows[5], first)],
+            [row(simd, &rows[6], first), row(simd, &rows[7], first), row(simd, &rows[8], first)],
+        ])
     }
+}
+
+/// The numbers of a row from `first` on.
+#[inline(always)]
+fn row<V: Simd>(simd: V, row: &[i32], first: usize) -> i32x16<V> {
+    i32x16::from_slice(simd, &row[first..first + LANES])
 }
 
 /// Corners of [`LANES`] triangles: corner k's axis i is `[k][i]`.
@@ -143,23 +148,28 @@ impl<V: Simd> Vectors<V> {
     /// The voxels whose closed cubes meet the triangles' closed bounding boxes: lowest and highest along each axis.
     #[inline(always)]
     pub(super) fn boxes(&self) -> [[i32x16<V>; 3]; 2] {
-        let [mut low, mut high] = [self.0[0]; 2];
-        for i in 0..3 {
-            low[i] = (self.least(i) - 1) >> STEP_BITS;
-            high[i] = self.most(i) >> STEP_BITS;
-        }
-        [low, high]
+        let (least, most) = ([self.least(0), self.least(1), self.least(2)], [self.most(0), self.most(1), self.most(2)]);
+        [
+            [(least[0] - 1) >> STEP_BITS, (least[1] - 1) >> STEP_BITS, (least[2] - 1) >> STEP_BITS],
+            [most[0] >> STEP_BITS, most[1] >> STEP_BITS, most[2] >> STEP_BITS],
+        ]
     }
 
-    /// The corners as seen from `origin`, times `scale`, a power of two: within 2^24 steps.
+    /// The corners as seen from `origin`, times `scale`, a power of two: exact within 2^24 steps.
     #[inline(always)]
-    pub(super) fn floats(&self, simd: V, origin: [i32x16<V>; 3], scale: f32) -> Halves<V> {
+    pub(super) fn floats(&self, origin: [i32x16<V>; 3], scale: f32) -> [[f32x16<V>; 3]; 3] {
+        let [a, b, c] = self.0;
+        [local(a, origin, scale), local(b, origin, scale), local(c, origin, scale)]
+    }
+
+    /// [`Self::floats`] in two halves of the lanes, wide enough to calculate with.
+    #[inline(always)]
+    pub(super) fn halves(&self, simd: V, origin: [i32x16<V>; 3], scale: f32) -> Halves<V> {
+        let floats = self.floats(origin, scale);
         let mut halves = [[[f64x8::splat(simd, 0.0); 3]; 3]; 2];
         for k in 0..3 {
             for i in 0..3 {
-                // Exact: an f32 holds 24 bits.
-                let local = (self.0[k][i] - origin[i]).to_float::<fearless_simd::f32x16<V>>() * scale;
-                let (first, second) = local.widen();
+                let (first, second) = floats[k][i].widen();
                 halves[0][k][i] = first;
                 halves[1][k][i] = second;
             }
@@ -168,48 +178,65 @@ impl<V: Simd> Vectors<V> {
     }
 }
 
+/// A corner as seen from `origin`, times `scale`.
+#[inline(always)]
+fn local<V: Simd>(corner: [i32x16<V>; 3], origin: [i32x16<V>; 3], scale: f32) -> [f32x16<V>; 3] {
+    [
+        (corner[0] - origin[0]).to_float::<f32x16<V>>() * scale,
+        (corner[1] - origin[1]).to_float::<f32x16<V>>() * scale,
+        (corner[2] - origin[2]).to_float::<f32x16<V>>() * scale,
+    ]
+}
+
+/// Triangles that wait for their path at most: several vectors' worth, for the reason given at [`BLOCK`].
+const WAITING: usize = 128;
+
 /// Triangles of one kind that wait until there are enough for all lanes.
 pub(super) struct Queue {
-    /// Room for a vector that starts at any lane of the first.
-    corners: Corners<{ 2 * LANES }>,
+    corners: Corners<WAITING>,
     count: usize,
 }
 
 impl Queue {
     pub(super) const EMPTY: Self = Self { corners: Corners::NONE, count: 0 };
 
-    /// The number of triangles that wait.
-    #[inline(always)]
-    pub(super) fn count(&self) -> usize {
-        self.count
-    }
-
-    /// The first that wait; beyond [`Self::count`], lanes hold anything.
-    #[inline(always)]
-    pub(super) fn vectors<V: Simd>(&self, simd: V) -> Vectors<V> {
-        self.corners.vectors(simd, 0)
-    }
-
-    /// Adds the triangles of the lanes in `mask`; `true` when all lanes are taken, and then [`Self::take`] must follow.
+    /// Adds the triangles of the lanes in `mask`; `true` when [`Self::take`] must follow before the next ones.
     #[inline(always)]
     pub(super) fn push<V: Simd>(&mut self, simd: V, from: &Vectors<V>, mask: u64) -> bool {
         let lanes = fearless_simd::mask32x16::from_bitmask(simd, mask);
-        let at = self.count % LANES;
+        let at = self.count.min(WAITING - LANES);
         for k in 0..3 {
             for i in 0..3 {
                 from.0[k][i].compress(lanes).store_slice(&mut self.corners.rows[3 * k + i][at..at + LANES]);
             }
         }
         self.count += mask.count_ones() as usize;
-        self.count >= LANES
+        self.count > WAITING - LANES
     }
 
-    /// Drops the first [`LANES`] triangles.
+    /// The lanes in use of the vector of triangles that wait from `first` on: all, or as many as are left if they are to be
+    /// done too, or none.
     #[inline(always)]
-    pub(super) fn take(&mut self) {
-        for row in &mut self.corners.rows {
-            row.copy_within(LANES.., 0);
+    pub(super) fn lanes(&self, first: usize, all: bool) -> usize {
+        let lanes = self.count.saturating_sub(first).min(LANES);
+        if lanes == LANES || all { lanes } else { 0 }
+    }
+
+    /// The triangles that wait from `first` on; beyond [`Self::lanes`], anything.
+    #[inline(always)]
+    pub(super) fn vectors<V: Simd>(&self, simd: V, first: usize) -> Vectors<V> {
+        self.corners.vectors(simd, first.min(WAITING - LANES))
+    }
+
+    /// Keeps the triangles, fewer than a vector's, from `first` on.
+    #[inline(always)]
+    pub(super) fn keep<V: Simd>(&mut self, simd: V, first: usize) {
+        let kept = self.vectors(simd, first);
+        for k in 0..3 {
+            for i in 0..3 {
+                kept.0[k][i].store_slice(&mut self.corners.rows[3 * k + i][..LANES]);
+            }
         }
-        self.count = self.count.saturating_sub(LANES);
+        self.count = self.count.saturating_sub(first);
     }
 }

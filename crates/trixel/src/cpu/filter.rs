@@ -1,0 +1,276 @@
+//! The tests of triangles of a few voxels in f32, sixteen triangles at a time, and which of them rounding may have decided.
+//!
+//! Half a voxel is the unit, and the middle of a cube of `SIDE` voxels the origin, so that voxels' centres are whole numbers
+//! `p` with `|p| < SIDE`, and corners are exact, with `|v| <= SIDE <= 4`. Let `m` be the longest side of a triangle's box
+//! and `u = 2^-24` the most by which a sum or product of floats is off, relative to it.
+//!
+//! - Edges `e` are exact, with `|e| <= m`. A component of the normal, `p - q` of two products, is off by at most
+//!   `u (|p| + |q| + |p - q|)`, so that its sign is right from `8 u (|p| + |q|)` on.
+//! - An edge function is `e x v + reach + e x p`, of which only sums and products of two are rounded: off by less than
+//!   `64 u m`.
+//! - The plane's term, `N . v + N . p` against its reach, is off by less than `256 u m^2`.
+//!
+//! An edge that a projection shows as a point has only zeros. It passes whatever the voxel, and is given a reach that says
+//! so; the reach of any other is at least a step, `2^-15`, and thus as large as `64 u m` without help.
+
+use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
+
+use super::rule::SurfaceRule;
+
+/// The longest side of a cube.
+const MOST: usize = 4;
+
+/// Voxels of a cube of `SIDE` in two halves: voxel `(x, y, z)` is bit `(SIDE x + y) SIDE + z`, from 32 on in the second.
+pub(super) type Bits = [i32; 2];
+
+/// [`Bits`] for each lane.
+pub(super) type Voxels<V> = [i32x16<V>; 2];
+
+/// For each cell of a projection, the voxels that it shows.
+type Cells = [[Bits; MOST]; MOST];
+
+/// A share of the longest side by which an edge function may be off.
+const EDGE_DOUBT: f32 = 64.0 * UNIT;
+/// A share of its square by which the plane's term may be off.
+const PLANE_DOUBT: f32 = 256.0 * UNIT;
+/// A share of its products by which a component of the normal may be off.
+const NORMAL_DOUBT: f32 = 8.0 * UNIT;
+const UNIT: f32 = 1.0 / (1 << 24) as f32;
+
+/// Constants for cubes of `SIDE`.
+pub(super) struct Cube<const SIDE: usize>;
+
+impl<const SIDE: usize> Cube<SIDE> {
+    /// The cells of the projections to yz, zx and xy.
+    pub(super) const CELLS: [Cells; 3] = [cells::<SIDE>(1, 2), cells::<SIDE>(2, 0), cells::<SIDE>(0, 1)];
+    /// The layers across each axis.
+    pub(super) const LAYERS: [[Bits; MOST]; 3] = [layers::<SIDE>(0), layers::<SIDE>(1), layers::<SIDE>(2)];
+    /// The words of [`Bits`] in use.
+    pub(super) const WORDS: usize = (SIDE * SIDE * SIDE).div_ceil(32);
+}
+
+/// The cells of a layer of 4 x 4 voxels: `(a, b)` is bit `4 a + b`.
+const LAYER: Cells = {
+    let mut cells = [[[0; 2]; MOST]; MOST];
+    let mut i = 0;
+    while i < MOST * MOST {
+        cells[i / MOST][i % MOST][0] = 1 << i;
+        i += 1;
+    }
+    cells
+};
+
+/// The bit of a voxel.
+const fn bit<const SIDE: usize>(x: usize, y: usize, z: usize) -> Bits {
+    let bit = 1u64 << ((SIDE * x + y) * SIDE + z);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "the halves")]
+    [bit as i32, (bit >> 32) as i32]
+}
+
+/// What the projection to the axes a and b shows in each of its cells.
+const fn cells<const SIDE: usize>(a: usize, b: usize) -> Cells {
+    let mut cells = [[[0; 2]; MOST]; MOST];
+    let mut voxel = 0;
+    while voxel < SIDE * SIDE * SIDE {
+        let index = [voxel / (SIDE * SIDE), voxel / SIDE % SIDE, voxel % SIDE];
+        let bit = bit::<SIDE>(index[0], index[1], index[2]);
+        let cell = &mut cells[index[a]][index[b]];
+        *cell = [cell[0] | bit[0], cell[1] | bit[1]];
+        voxel += 1;
+    }
+    cells
+}
+
+/// The voxels of each layer across an axis.
+const fn layers<const SIDE: usize>(axis: usize) -> [Bits; MOST] {
+    let cells = cells::<SIDE>(axis, (axis + 1) % 3);
+    let mut layers = [[0; 2]; MOST];
+    let mut i = 0;
+    while i < MOST * MOST {
+        let cell = cells[i / MOST][i % MOST];
+        let layer = &mut layers[i / MOST];
+        *layer = [layer[0] | cell[0], layer[1] | cell[1]];
+        i += 1;
+    }
+    layers
+}
+
+/// What is known of sixteen triangles.
+pub(super) struct Filtered<V: Simd> {
+    /// The voxels that pass.
+    pub(super) voxels: Voxels<V>,
+    /// Lanes in which rounding may have decided.
+    pub(super) doubtful: u64,
+}
+
+/// The voxels of cubes of `SIDE` that triangles meet, for their corners and the longest sides of their boxes.
+#[inline(always)]
+pub(super) fn cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
+    simd: V,
+    rule: &R,
+    v: &[[f32x16<V>; 3]; 3],
+    longest: f32x16<V>,
+) -> Filtered<V> {
+    let mut tests = Tests::new(simd, longest);
+    let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
+    let n = [tests.cross(&e, 1, 2), tests.cross(&e, 2, 0), tests.cross(&e, 0, 1)];
+    let mut voxels = tests.plane::<R, SIDE>(simd, rule, n, v[0]);
+    for (i, n) in n.into_iter().enumerate() {
+        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+        let pass = tests.edges::<R, SIDE>(simd, rule, pick(v, a, b), pick(&e, a, b), n, &Cube::<SIDE>::CELLS[i]);
+        for word in 0..Cube::<SIDE>::WORDS {
+            voxels[word] &= pass[word];
+        }
+    }
+    Filtered { voxels, doubtful: tests.doubtful(simd) }
+}
+
+/// The cells `(a, b)` of 4 x 4 that projections meet: bit `4 a + b` of the first half.
+#[inline(always)]
+pub(super) fn layers_of_four<V: Simd, R: SurfaceRule>(
+    simd: V,
+    rule: &R,
+    v: &[[f32x16<V>; 2]; 3],
+    longest: f32x16<V>,
+) -> Filtered<V> {
+    let mut tests = Tests::new(simd, longest);
+    let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
+    let area = tests.cross(&e, 0, 1);
+    let voxels = tests.edges::<R, 4>(simd, rule, *v, e, area, &LAYER);
+    Filtered { voxels, doubtful: tests.doubtful(simd) }
+}
+
+/// How near to rounding the tests have come.
+struct Tests<V: Simd> {
+    edge_doubt: f32x16<V>,
+    plane_doubt: f32x16<V>,
+    /// The least by which a component of the normal has the sign it seems to have.
+    normal: f32x16<V>,
+    /// The least absolute values.
+    edge: f32x16<V>,
+    plane: f32x16<V>,
+}
+
+impl<V: Simd> Tests<V> {
+    #[inline(always)]
+    fn new(simd: V, longest: f32x16<V>) -> Self {
+        let far = f32x16::splat(simd, f32::MAX);
+        Self {
+            edge_doubt: longest * EDGE_DOUBT,
+            plane_doubt: longest * longest * PLANE_DOUBT,
+            normal: far,
+            edge: far,
+            plane: far,
+        }
+    }
+
+    #[inline(always)]
+    fn doubtful(&self, simd: V) -> u64 {
+        let doubt = (self.edge - self.edge_doubt).min(self.plane - self.plane_doubt).min(self.normal);
+        doubt.simd_lt(f32x16::splat(simd, 0.0)).to_bitmask()
+    }
+
+    /// The component of the normal across the axes i and j.
+    #[inline(always)]
+    fn cross<const AXES: usize>(&mut self, e: &[[f32x16<V>; AXES]; 3], i: usize, j: usize) -> f32x16<V> {
+        let (p, q) = (e[0][i] * e[1][j], e[0][j] * e[1][i]);
+        let n = p - q;
+        self.normal = self.normal.min(n.abs() - (p.abs() + q.abs()) * NORMAL_DOUBT);
+        n
+    }
+
+    /// The voxels within reach of the plane.
+    #[inline(always)]
+    fn plane<R: SurfaceRule, const SIDE: usize>(
+        &mut self,
+        simd: V,
+        rule: &R,
+        n: [f32x16<V>; 3],
+        v: [f32x16<V>; 3],
+    ) -> Voxels<V> {
+        let zero = f32x16::splat(simd, 0.0);
+        let mut voxels = [i32x16::splat(simd, 0); 2];
+        let reach = rule.centre_plane_reach([n[0].abs(), n[1].abs(), n[2].abs()]);
+        let at_middle = n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
+        for x in 0..SIDE {
+            let at_x = n[0] * centre::<SIDE>(x) - at_middle;
+            for y in 0..SIDE {
+                let at_y = n[1] * centre::<SIDE>(y) + at_x;
+                for z in 0..SIDE {
+                    let at = n[2] * centre::<SIDE>(z) + at_y;
+                    let within = reach - at.abs();
+                    self.plane = self.plane.min(within.abs());
+                    let bits = bit::<SIDE>(x, y, z);
+                    let passing = within.simd_ge(zero);
+                    for word in 0..Cube::<SIDE>::WORDS {
+                        voxels[word] = passing.select(voxels[word] | bits[word], voxels[word]);
+                    }
+                }
+            }
+        }
+        voxels
+    }
+
+    /// The voxels that cells of a projection show in which all three edge functions hold.
+    #[inline(always)]
+    fn edges<R: SurfaceRule, const SIDE: usize>(
+        &mut self,
+        simd: V,
+        rule: &R,
+        v: [[f32x16<V>; 2]; 3],
+        e: [[f32x16<V>; 2]; 3],
+        area: f32x16<V>,
+        cells: &Cells,
+    ) -> Voxels<V> {
+        let zero = f32x16::splat(simd, 0.0);
+        // Inward normals point left of the edges when the projection turns left.
+        let side = f32x16::splat(simd, 1.0).copysign(area);
+        let mut least = [[zero; SIDE]; SIDE];
+        for k in 0..3 {
+            let (ea, eb) = (e[k][0] * side, e[k][1] * side);
+            let reach = rule.centre_reach(ea.abs(), eb.abs()).max(self.edge_doubt);
+            let at_middle = eb * v[k][0] + reach - ea * v[k][1];
+            for a in 0..SIDE {
+                let at_a = at_middle - eb * centre::<SIDE>(a);
+                for b in 0..SIDE {
+                    let at = ea * centre::<SIDE>(b) + at_a;
+                    least[a][b] = if k == 0 { at } else { least[a][b].min(at) };
+                }
+            }
+        }
+        let mut voxels = [i32x16::splat(simd, 0); 2];
+        for a in 0..SIDE {
+            for b in 0..SIDE {
+                self.edge = self.edge.min(least[a][b].abs());
+                let passing = least[a][b].simd_ge(zero);
+                for word in 0..Cube::<SIDE>::WORDS {
+                    voxels[word] = passing.select(voxels[word] | cells[a][b][word], voxels[word]);
+                }
+            }
+        }
+        voxels
+    }
+}
+
+/// The centre of the `i`th voxel along a side.
+#[inline(always)]
+#[expect(clippy::cast_precision_loss, reason = "at most 4")]
+const fn centre<const SIDE: usize>(i: usize) -> f32 {
+    2.0 * i as f32 - (SIDE - 1) as f32
+}
+
+/// `b - a`.
+#[inline(always)]
+fn between<V: Simd, const AXES: usize>(a: [f32x16<V>; AXES], b: [f32x16<V>; AXES]) -> [f32x16<V>; AXES] {
+    let mut edge = b;
+    for i in 0..AXES {
+        edge[i] = b[i] - a[i];
+    }
+    edge
+}
+
+/// The components a and b of three vectors.
+#[inline(always)]
+fn pick<V: Simd>(of: &[[f32x16<V>; 3]; 3], a: usize, b: usize) -> [[f32x16<V>; 2]; 3] {
+    [[of[0][a], of[0][b]], [of[1][a], of[1][b]], [of[2][a], of[2][b]]]
+}
