@@ -13,6 +13,10 @@ pub(crate) const MAX_PAIRS: u32 = 65_535 * 64 * 1024;
 /// Voxels along each axis of a tile of `tiled`, as logarithms: a column of it is one word.
 pub(crate) const TILE_SHIFT: [u32; 3] = [4, 4, 5];
 
+/// Likewise of tiles whose voxels have values, the largest first: each value of a voxel takes four bytes of a workgroup's
+/// memory, and smaller tiles take more pairs.
+pub(crate) const TARGET_TILES: [[u32; 3]; 3] = [[3, 3, 5], [3, 2, 5], [2, 2, 5]];
+
 /// Pairs of triangle and tile that `tiled` sorts at a time: 8 bytes each, twice.
 pub(crate) const TILE_ROUND: u32 = 1 << 22;
 
@@ -40,6 +44,8 @@ pub(crate) struct Limits {
     pub(crate) groups: u32,
     /// Bytes between the parameter sets of consecutive dispatches.
     pub(crate) parameter_stride: u32,
+    /// Bytes of a workgroup's own memory.
+    pub(crate) workgroup_bytes: u32,
 }
 
 impl Limits {
@@ -52,6 +58,7 @@ impl Limits {
             target_size: device.max_texture_dimension_2d.min(8192),
             groups: device.max_compute_workgroups_per_dimension.min(65_535),
             parameter_stride: device.min_uniform_buffer_offset_alignment.max(256),
+            workgroup_bytes: device.max_compute_workgroup_storage_size,
         }
     }
 

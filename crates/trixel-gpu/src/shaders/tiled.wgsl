@@ -37,6 +37,7 @@ fn blend_share(start: u32, local: u32) {
         }
         let shape = shape_of(corners(pair.y));
         if (shape.flags & EMPTY) == 0u {
+            paint_with(pair.y);
             blend(triangle_of(shape));
         }
     }
@@ -52,21 +53,23 @@ fn tiled(
     let there = share < shares.invocations / WORKGROUP;
     for (var i = local; i < TILE_WORDS; i += WORKGROUP) {
         atomicStore(&tile_words[i], 0u);
+        begin_targets_of(i);
     }
     workgroupBarrier();
     if there {
         blend_share(shares.starts[share], local);
     }
     workgroupBarrier();
+    var corner = vec3<i32>(0);
     if there {
         if COUNTING {
             count(COUNT_INVOCATIONS, 1u);
         }
-        let corner = tile_numbered(pairs[shares.starts[share]].x) << TILE_SHIFT;
+        corner = tile_numbered(pairs[shares.starts[share]].x) << TILE_SHIFT;
         for (var i = local; i < TILE_WORDS; i += WORKGROUP) {
             let bits = atomicLoad(&tile_words[i]);
             if bits != 0u {
-                let column = corner.xy + vec2<i32>(vec2<u32>(i >> TILE_SHIFT.y, i & ((1u << TILE_SHIFT.y) - 1u)));
+                let column = corner.xy + vec2<i32>(column_of(i));
                 if MODE == SOLID {
                     flip_voxels(column, u32(corner.z) >> 5u, bits);
                 } else {
@@ -76,5 +79,6 @@ fn tiled(
         }
         flush_counters();
     }
+    write_targets(corner, local);
     count_lanes(local);
 }
