@@ -221,7 +221,8 @@ impl Kernel {
                 "product_portable" "wide" "division" "numbering" "entry" "light" "surface" "nearest" "combine" "put_row"
                 "fragment_rows"
             ),
-            Self::BeginTargets(_) | Self::JoinTargets(_) => shader!("numbering" "entry" "place" "join_targets"),
+            Self::BeginTargets(_) => shader!("numbering" "begin_targets"),
+            Self::JoinTargets(_) => shader!("numbering" "entry" "place" "join_targets"),
             Self::SwitchColumns { .. } | Self::CorrectXor | Self::CorrectMarch => shader!("numbering" "fill_slices"),
             Self::ResolveClaims { .. } => shader!("numbering" "resolve_claims"),
         }

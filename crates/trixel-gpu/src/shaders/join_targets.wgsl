@@ -1,21 +1,9 @@
-// The rows that workgroups wrote, blended into one a voxel in the order of the list. `begin_values` and `blend_values` are
-// prepended, for the targets asked for.
+// The rows that workgroups wrote, blended into one a voxel in the order of the list. `blend_values` is prepended, for the
+// targets asked for.
 
 // A voxel's entry and its values, after four other words.
 @group(0) @binding(3) var<storage, read> rows: array<u32>;
 @group(0) @binding(4) var<storage, read_write> values: array<atomic<u32>>;
-
-@compute @workgroup_size(WORKGROUP)
-fn begin_targets(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let i = invocation(group, groups, local);
-    if i < locate.items {
-        begin_values(i * TARGETS);
-    }
-}
 
 @compute @workgroup_size(WORKGROUP)
 fn join_targets(

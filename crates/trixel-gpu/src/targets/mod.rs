@@ -194,12 +194,9 @@ pub(crate) fn blend(
     let rows = gpu.storage("the voxels' render targets", bytes, usage)?;
     let ranked = rank(&gpu, volume)?;
     let mut dispatcher = Dispatcher::new(&gpu);
-    let words = [list.len()];
-    dispatcher.dispatch(
-        Kernel::BeginTargets(plan),
-        &[(0, Bound::Words(&words)), (4, Bound::Buffer(&rows))],
-        list.len(),
-    )?;
+    let length = [list.len()];
+    let bound = [(0, Bound::Words(&length)), (1, Bound::Buffer(&rows))];
+    dispatcher.dispatch(Kernel::BeginTargets(plan), &bound, list.len())?;
     for slab in &ranked {
         // So that places count from the first slab on.
         let words = locate_words(volume, slab.slab, count, slab.first().wrapping_neg(), 0);
