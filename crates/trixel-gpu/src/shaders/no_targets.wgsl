@@ -9,5 +9,5 @@ fn paint_with(triangle: u32) {
 fn paint(word: u32, bits: u32) {
 }
 
-fn write_targets(corner: vec3<i32>, local: u32) {
+fn write_targets(word: u32, lowest: vec3<u32>, bits: u32) {
 }

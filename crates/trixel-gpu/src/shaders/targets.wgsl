@@ -20,8 +20,6 @@ struct Rows {
 
 // TARGETS words a voxel, z fastest.
 var<workgroup> values: array<atomic<u32>, TILE_WORDS * 32u * TARGETS>;
-// Where the rows of each word's voxels go.
-var<workgroup> places: array<u32, TILE_WORDS>;
 
 var<private> painted: Painted;
 
@@ -42,36 +40,24 @@ fn paint(word: u32, bits: u32) {
     }
 }
 
-// Writes the tile's rows with all invocations of the workgroup; `corner` is its lowest voxel.
-fn write_targets(corner: vec3<i32>, local: u32) {
-    for (var i = local; i < TILE_WORDS; i += WORKGROUP) {
-        let number = countOneBits(atomicLoad(&tile_words[i]));
-        if number != 0u {
-            let place = atomicAdd(&rows.count, number);
-            if place + number < place {
-                atomicStore(&rows.wrapped, 1u);
-            }
-            places[i] = place;
-        }
+// Appends the voxels of a word, the lowest of which is given, with their values.
+fn write_targets(word: u32, lowest: vec3<u32>, bits: u32) {
+    let number = countOneBits(bits);
+    var place = atomicAdd(&rows.count, number);
+    if place + number < place {
+        atomicStore(&rows.wrapped, 1u);
     }
-    workgroupBarrier();
-    for (var i = local; i < TILE_WORDS * 32u; i += WORKGROUP) {
-        let word = i >> 5u;
-        let bits = atomicLoad(&tile_words[word]);
-        let bit = 1u << (i & 31u);
-        if (bits & bit) == 0u {
-            continue;
-        }
-        let place = places[word] + countOneBits(bits & (bit - 1u));
+    for (var rest = bits; rest != 0u; rest &= rest - 1u) {
         if place < rows.capacity {
-            let column = vec2<u32>(corner.xy) + column_of(word);
-            let entry = entry_of(vec3<u32>(column, u32(corner.z) + (i & 31u)));
+            let bit = firstTrailingBit(rest);
+            let entry = entry_of(lowest + vec3<u32>(0u, 0u, bit));
             let at = (2u + TARGETS) * place;
             rows.words[at] = entry.x;
             rows.words[at + 1u] = entry.y;
             for (var t = 0u; t < TARGETS; t++) {
-                rows.words[at + 2u + t] = atomicLoad(&values[i * TARGETS + t]);
+                rows.words[at + 2u + t] = atomicLoad(&values[(word * 32u + bit) * TARGETS + t]);
             }
         }
+        place++;
     }
 }

@@ -60,12 +60,11 @@ fn tiled(
         blend_share(shares.starts[share], local);
     }
     workgroupBarrier();
-    var corner = vec3<i32>(0);
     if there {
         if COUNTING {
             count(COUNT_INVOCATIONS, 1u);
         }
-        corner = tile_numbered(pairs[shares.starts[share]].x) << TILE_SHIFT;
+        let corner = tile_numbered(pairs[shares.starts[share]].x) << TILE_SHIFT;
         for (var i = local; i < TILE_WORDS; i += WORKGROUP) {
             let bits = atomicLoad(&tile_words[i]);
             if bits != 0u {
@@ -75,10 +74,10 @@ fn tiled(
                 } else {
                     or_voxels(column, u32(corner.z) >> 5u, bits);
                 }
+                write_targets(i, vec3<u32>(vec2<u32>(column), u32(corner.z)), bits);
             }
         }
         flush_counters();
     }
-    write_targets(corner, local);
     count_lanes(local);
 }

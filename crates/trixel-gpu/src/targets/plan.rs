@@ -27,7 +27,7 @@ pub(crate) struct Plan {
 /// Bytes of workgroup memory that so many targets take in a tile: `tile_memory.wgsl`, `targets.wgsl` and `lanes.wgsl`.
 fn tile_bytes([x, y, z]: [u32; 3], targets: usize) -> u64 {
     let columns = 1u64 << (x + y);
-    columns * (4 + 4 + 4 * (1 << z) * targets as u64) + 256
+    columns * (4 + 4 * (1 << z) * targets as u64) + 256
 }
 
 /// How many targets fit so many bytes of workgroup memory.
@@ -150,6 +150,7 @@ mod tests {
         assert_eq!(tile(8, 16 << 10), None);
         assert_eq!(most_targets(16 << 10), 7);
         assert_eq!(tile(3, 32 << 10), Some([3, 3, 5]));
+        assert_eq!(most_targets(32 << 10), 15);
         assert_eq!(tile(0, 32 << 10), None);
         assert_eq!(tile(MOST_TARGETS + 1, 1 << 20), None);
         assert_eq!(most_targets(1 << 20), MOST_TARGETS);
