@@ -109,10 +109,11 @@ impl<'a> Layout<'a> {
         volume: &'a GpuVolume,
         scratch: &Scratch,
         run: u32,
+        appends: bool,
     ) -> Result<Self, GpuError> {
         let largest = volume.slabs().iter().flat_map(|slab| projection(job, slab).0).max();
         let target_size = largest.unwrap_or(1).min(gpu.limits().target_size);
-        let max_columns = limits::columns_per_invocation(job.mode(), job.overlap_steps());
+        let max_columns = limits::columns_per_invocation(job.mode(), job.overlap_steps(), appends);
         let mut sets = ParameterSets { bytes: vec![], stride: gpu.limits().parameter_stride as usize };
         let mut laid_out = vec![];
         for slab in volume.slabs() {

@@ -24,6 +24,11 @@ pub(crate) const TILE_ROUND: u32 = 1 << 22;
 /// [`SAFE_ITERATIONS`].
 pub(crate) const TILE_SHARE: u32 = 64 * WORKGROUP;
 
+/// Likewise where voxels have values, which costs an iteration a voxel: 16 an invocation. In a tile of 8 x 8 x 32 a triangle
+/// has at most 256 columns, and invocations that run in step take up to 4 iterations for bits along z and 4 for those across:
+/// 2300 iterations, or along slices 64 columns of 32 voxels.
+pub(crate) const TARGET_SHARE: u32 = 16 * WORKGROUP;
+
 /// Invocations of a workgroup.
 pub(crate) const WORKGROUP: u32 = 64;
 
@@ -81,10 +86,16 @@ impl Limits {
 }
 
 /// Columns of one triangle that one invocation may take, so that every driver finishes its loops.
-pub(crate) fn columns_per_invocation(mode: Mode, overlap_steps: u32) -> u32 {
+///
+/// Voxels that are appended to a list take an iteration each, and invocations that run in step those of all their branches:
+/// at most 8 for bits along z and 4 for those across, or 14 for the doubled cubes of a solid's shell.
+pub(crate) fn columns_per_invocation(mode: Mode, overlap_steps: u32, appends: bool) -> u32 {
     let overlap_voxels = overlap_steps.div_ceil(1 << STEP_BITS);
-    match mode {
-        Mode::Sliced => SAFE_ITERATIONS / 4 / (3 + 2 * overlap_voxels.div_ceil(32)),
-        _ => SAFE_ITERATIONS / 4,
+    let words = 3 + 2 * overlap_voxels.div_ceil(32);
+    match (mode, appends) {
+        (Mode::Sliced, true) => SAFE_ITERATIONS / (1 + 33 * words),
+        (Mode::Sliced, false) => SAFE_ITERATIONS / 4 / words,
+        (_, true) => SAFE_ITERATIONS / 16,
+        (_, false) => SAFE_ITERATIONS / 4,
     }
 }

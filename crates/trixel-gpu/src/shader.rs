@@ -3,7 +3,7 @@
 use trixel::Mode;
 
 use crate::cutoff::{Dilation, Heuristic};
-use crate::limits::{MAX_EXTENT, MAX_PAIRS, TILE_SHARE, TILE_SHIFT};
+use crate::limits::{MAX_EXTENT, MAX_PAIRS, TARGET_SHARE, TILE_SHARE, TILE_SHIFT};
 use crate::targets::Plan;
 use crate::tier::Tier;
 
@@ -300,7 +300,7 @@ impl Sink {
 
     /// Pairs of triangle and tile that a workgroup takes.
     pub(crate) fn tile_share(self) -> u32 {
-        if let Self::Targets(plan) = self { plan.share() } else { TILE_SHARE }
+        if let Self::Targets(_) = self { TARGET_SHARE } else { TILE_SHARE }
     }
 
     fn files(self) -> &'static [&'static str] {

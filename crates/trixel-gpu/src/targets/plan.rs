@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{Blend, Source, Target};
-use crate::limits::{TARGET_TILES, TILE_SHARE};
+use crate::limits::TARGET_TILES;
 
 /// The most targets of any plan.
 pub(crate) const MOST_TARGETS: usize = 16;
@@ -58,11 +58,6 @@ impl Plan {
 
     pub(crate) fn tile(&self) -> [u32; 3] {
         self.tile
-    }
-
-    /// Pairs of a workgroup: a quarter of what occupancy alone takes, because each voxel costs an iteration too.
-    pub(crate) fn share(&self) -> u32 {
-        TILE_SHARE / 4
     }
 
     fn targets(&self) -> impl Iterator<Item = (Blend, Painted)> {
