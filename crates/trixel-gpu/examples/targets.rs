@@ -1,5 +1,5 @@
 //! Several values of each voxel in the pass that finds the voxels, and what they cost: strategy `tiled` without render
-//! targets, with one and with three, beside the same value by way of attributes.
+//! targets, with one and with three, beside the first one's values by way of attributes, which must be the same.
 //!
 //! ```sh
 //! cargo run --release -p trixel-gpu --example targets -- MESH RESOLUTION [ADAPTER]
@@ -10,7 +10,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use trixel::attributes::{AttributeKind, AttributeRequest, Combine};
+use trixel::attributes::{AttributeKind, AttributeRequest, Combine, Values};
 use trixel::lattice::LatticeMesh;
 use trixel::{Grid, Job, Mesh, Mode, Strategy, VoxelOrder};
 use trixel_gpu::{
@@ -57,37 +57,41 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let names = ["bits", "bits and list", "1 target", "3 targets", "attribute `triangle`"];
     let mut times = names.map(|_| (vec![], vec![]));
-    let mut shown = String::new();
+    let (mut rows, mut ids, mut same) = (0, vec![], false);
     // The first round builds pipelines and buffers.
     for round in 0..=RUNS {
         for (i, (whole, pass)) in times.iter_mut().enumerate() {
             let start = Instant::now();
-            match i {
-                2 | 3 => {
-                    let found = voxelizer.tiled_targets(&on_gpu, &voxels, &three[..2 * i - 3])?;
-                    gpu.wait()?;
-                    let (list, rows) = (found.list().len(), found.appended());
-                    shown = format!("{list} voxels, {rows} rows written by workgroups");
-                }
-                _ => {
-                    voxelizer.run(&on_gpu, &voxels)?;
-                    if i == 1 {
-                        GpuVoxelList::of(&gpu, &voxels, ListMethod::Scan, VoxelOrder::Xyz)?;
-                    } else if i == 4 {
-                        voxelizer.attributes(&surface, &voxels)?;
-                    }
-                    gpu.wait()?;
-                }
+            let (mut blended, mut attributes) = (None, None);
+            if let 2 | 3 = i {
+                blended = Some(voxelizer.tiled_targets(&on_gpu, &voxels, &three[..2 * i - 3])?);
+            } else {
+                voxelizer.run(&on_gpu, &voxels)?;
             }
+            match i {
+                1 => drop(GpuVoxelList::of(&gpu, &voxels, ListMethod::Scan, VoxelOrder::Xyz)?),
+                4 => attributes = Some(voxelizer.attributes(&surface, &voxels)?),
+                _ => {}
+            }
+            gpu.wait()?;
             if round > 0 {
                 whole.push(start.elapsed().as_secs_f64() * 1e3);
                 pass.push(tile_pass(&voxelizer.pass_times()?));
             }
+            if let (Some(blended), RUNS) = (blended, round) {
+                rows = blended.appended();
+                ids = blended.download(&gpu)?.into_iter().next().unwrap_or_default();
+            }
+            if let (Some(attributes), RUNS) = (attributes, round) {
+                same =
+                    attributes.download(&gpu, &mesh)?.get(AttributeKind::Triangle) == Some(&Values::U32(ids.clone()));
+            }
         }
     }
-    println!("{}: {} triangles, {shown}", gpu.info(), mesh.triangles.len());
+    let (triangles, count) = (mesh.triangles.len(), ids.len());
+    println!("{}: {triangles} triangles, {count} voxels, {rows} rows written by workgroups", gpu.info());
     for (name, (whole, pass)) in names.iter().zip(times) {
         println!("{name:>20}: {:8.2} ms, of which the tiles {:8.2} ms", median(whole), median(pass));
     }
-    Ok(())
+    if same { Ok(()) } else { Err("the lowest triangles are not the attribute's".into()) }
 }

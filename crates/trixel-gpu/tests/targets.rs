@@ -145,6 +145,9 @@ fn every_blend_is_that_of_the_triangles_one_by_one() {
         compare(&gpu, "one", &mesh, &tiled(dims, Mode::Thin), &[Target::ID]);
         if !slow {
             compare(&gpu, "three", &mesh, &tiled(dims, Mode::Conservative), &all[..3]);
+            // As many as 32 KiB hold.
+            let most: Vec<_> = all.iter().copied().cycle().take(15).collect();
+            compare(&gpu, "fifteen", &mesh, &tiled(dims, Mode::Conservative), &most);
             let overlapping = tiled(dims, Mode::Sliced).with_overlap(1.6).unwrap();
             compare(&gpu, "slices", &mesh, &overlapping, &all[..2]);
         }
@@ -163,6 +166,24 @@ fn tiles_that_workgroups_share_blend_the_same() {
         let found = compare(&gpu, "crumbs", &mesh, &tiled(grid([12, 11, 10]), Mode::Conservative), &targets);
         assert!(found.appended() > found.list().len(), "{driver}: no tile was shared");
     }
+}
+
+#[test]
+fn loops_stay_short_in_the_worst_tile() {
+    // Every invocation takes as many pairs as it ever does, each with as many voxels of the tile as a triangle can have.
+    let steep = [[-30.0, 4.0, -20.0], [40.0, 4.0, -90.0], [5.0, 4.3, 130.0]];
+    let slanted = [[-30.0, -30.0, 0.5], [40.0, -29.0, 24.0], [4.0, 60.0, 31.0]];
+    let mesh = zoo::soup(&[vec![steep; 2048], vec![slanted; 2048]].concat());
+    // Every axis by turns, so that lanes which run in step take every branch.
+    let turned = |k: usize| slanted.map(|corner: [f64; 3]| std::array::from_fn(|axis| corner[(axis + k) % 3]));
+    let mixed = zoo::soup(&(0..4096).map(turned).collect::<Vec<_>>());
+    let gpu = open("llvmpipe");
+    compare(&gpu, "mixed walls", &mixed, &tiled(grid([8, 8, 32]), Mode::Conservative), &[Target::COUNT]);
+    for mode in [Mode::Conservative, Mode::Sliced] {
+        compare(&gpu, "walls", &mesh, &tiled(grid([8, 8, 32]), mode), &[Target::COUNT]);
+    }
+    let overlapping = tiled(grid([8, 8, 32]), Mode::Sliced).with_overlap(40.0).unwrap();
+    compare(&gpu, "full", &mesh, &overlapping, &[Target::COUNT]);
 }
 
 #[test]

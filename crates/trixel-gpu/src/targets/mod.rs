@@ -182,9 +182,9 @@ pub(crate) fn blend(
     let sink = Sink::Targets(plan);
     let pairs = voxelizer.count_pairs(mesh, volume, sink)?;
 
-    // About the surface of the grid; a wrong guess costs a second run.
+    // More than the surface of the grid; a wrong guess costs a second run.
     let [x, y, z] = volume.grid().dims().map(u64::from);
-    let guess = 2 * (x * y + y * z + z * x) + 1024;
+    let guess = 3 * (x * y + y * z + z * x) + 1024;
     let (appended, count) = lists::appended(&gpu, sink.entry_words(), &[], guess, |rows| {
         voxelizer.run_into(mesh, volume, Appending { sink, buffers: &[rows, &given], pairs: Some(&pairs) })
     })?;
