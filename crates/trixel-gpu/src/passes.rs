@@ -132,13 +132,12 @@ impl<'a> Recorder<'a> {
         setting: Setting<'a>,
         encoder: &'a mut wgpu::CommandEncoder,
     ) -> Result<(Recorder<'a>, Layout<'a>), GpuError> {
-        let Setting { gpu, job, cutoff, mesh, volume, variant: Variant { sink, .. }, .. } = setting;
+        let Setting { gpu, mesh, volume, appending: Appending { sink, buffers, .. }, .. } = setting;
         let status = setting.scratch.next_status(gpu, Layout::units(mesh, volume) as u64)?;
-        let layout = Layout::new(gpu, job, cutoff, mesh, volume, setting.scratch, status.run, sink.entry_words() > 0)?;
+        let layout = Layout::new(&setting, status.run)?;
         encoder.clear_buffer(&setting.scratch.counters, 0, None);
         encoder.clear_buffer(&status.buffer, 0, None);
         let (target_size, capacity) = (layout.target_size, layout.most_triangles);
-        let buffers = setting.appending.buffers;
         let append_group = gpu.pipelines().layouts().appending(sink).filter(|_| !buffers.is_empty()).map(|layout| {
             let buffers: Vec<_> = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
             bind(gpu, layout, &buffers)
