@@ -197,6 +197,40 @@ pub enum GpuError {
         /// Those there was room for.
         room: u32,
     },
+    /// A job that blends no render targets.
+    #[error(
+        "render targets are blended by strategy `tiled` on surfaces, not by `{strategy}` in mode `{mode}`; use `tiled` with \
+         another mode than `solid`, or `Voxelizer::attributes`"
+    )]
+    NoTargets {
+        /// The job's strategy.
+        strategy: trixel::Strategy,
+        /// The job's mode.
+        mode: trixel::Mode,
+    },
+    /// No render targets, or more than a workgroup's memory holds.
+    #[error(
+        "{given} render targets were asked for, and {adapter} blends 1 to {most} at a time, which is what the memory of a \
+         workgroup holds; blend them in several runs"
+    )]
+    TargetCount {
+        /// The adapter.
+        adapter: String,
+        /// Those asked for.
+        given: usize,
+        /// The most there can be.
+        most: usize,
+    },
+    /// A render target whose values are not one a triangle.
+    #[error("render target {target} has {given} values, and the mesh {triangles} triangles; give one value a triangle")]
+    TargetValues {
+        /// The target's place among those asked for, from 0 on.
+        target: usize,
+        /// Its values.
+        given: u64,
+        /// The mesh's triangles.
+        triangles: u64,
+    },
     /// The part of the mesh that the CPU does failed.
     #[error(transparent)]
     Cpu(#[from] trixel::Error),

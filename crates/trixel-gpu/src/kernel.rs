@@ -15,6 +15,7 @@ use crate::lists::SortKey;
 use crate::material_volume::Precision;
 use crate::shader::shader;
 use crate::sparse::Below;
+use crate::targets::Plan;
 
 /// A function of a shader, with the constants in front of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -55,6 +56,8 @@ pub(crate) enum Kernel {
     GatherPairs(Recipe),
     WriteFragmentRows(Recipe),
     CopyCounts(Recipe),
+    BeginTargets(Plan),
+    JoinTargets(Plan),
     /// Whether columns with an odd number of boundary voxels are filled as well.
     SwitchColumns {
         uncorrected: bool,
@@ -85,6 +88,7 @@ impl Kernel {
                 Self::FindLeaves(recipe),
             ]
         });
+        let blending = Plan::samples().into_iter().flat_map(|plan| [Self::BeginTargets(plan), Self::JoinTargets(plan)]);
         let others = [
             Self::ScanBlocks,
             Self::AddTotals,
@@ -119,7 +123,7 @@ impl Kernel {
         let resolving = Precision::ALL
             .into_iter()
             .flat_map(|precision| [false, true].map(|filled| Self::ResolveClaims { precision, filled }));
-        others.into_iter().chain(sorting).chain(attributes).chain(resolving).collect()
+        others.into_iter().chain(sorting).chain(attributes).chain(blending).chain(resolving).collect()
     }
 
     pub(crate) fn entry_point(self) -> &'static str {
@@ -154,6 +158,8 @@ impl Kernel {
             Self::GatherPairs(_) => "gather_pairs",
             Self::WriteFragmentRows(_) => "write_fragment_rows",
             Self::CopyCounts(_) => "copy_counts",
+            Self::BeginTargets(_) => "begin_targets",
+            Self::JoinTargets(_) => "join_targets",
             Self::SwitchColumns { .. } => "switch_columns",
             Self::CorrectXor => "correct_xor",
             Self::CorrectMarch => "correct_march",
@@ -200,7 +206,7 @@ impl Kernel {
             Self::MarchBricks => {
                 shader!("product_portable" "wide" "division" "numbering" "entry" "sort_key" "march" "brick_cell")
             }
-            Self::CountBeforePlanes | Self::LocateFragments => shader!("numbering" "entry" "locate"),
+            Self::CountBeforePlanes | Self::LocateFragments => shader!("numbering" "entry" "place" "locate"),
             Self::Prioritize(_) | Self::Weigh(_) => shader!(
                 "product_portable" "wide" "division" "numbering" "entry" "light" "surface" "nearest" "overlap" "combine"
                 "weigh"
@@ -215,6 +221,8 @@ impl Kernel {
                 "product_portable" "wide" "division" "numbering" "entry" "light" "surface" "nearest" "combine" "put_row"
                 "fragment_rows"
             ),
+            Self::BeginTargets(_) => shader!("numbering" "begin_targets"),
+            Self::JoinTargets(_) => shader!("numbering" "entry" "place" "join_targets"),
             Self::SwitchColumns { .. } | Self::CorrectXor | Self::CorrectMarch => shader!("numbering" "fill_slices"),
             Self::ResolveClaims { .. } => shader!("numbering" "resolve_claims"),
         }
@@ -239,6 +247,7 @@ impl Kernel {
             | Self::WriteFragmentRows(recipe)
             | Self::CopyCounts(recipe)
             | Self::FindLeaves(recipe) => recipe.constants(),
+            Self::BeginTargets(plan) | Self::JoinTargets(plan) => plan.blending(),
             Self::WriteNodes { leaves } => format!("const LEAVES: bool = {leaves};\n"),
             _ => String::new(),
         };

@@ -4,13 +4,11 @@
 use bytemuck::{Pod, Zeroable};
 use trixel::{Job, Mode};
 
-use crate::cutoff::Cutoff;
 use crate::error::GpuError;
-use crate::gpu::Gpu;
 use crate::limits::{self, MAX_EXTENT};
 use crate::mesh::{Chunk, GpuMesh};
+use crate::passes::Setting;
 use crate::pipelines::bind;
-use crate::scratch::Scratch;
 use crate::volume::{GpuVolume, Slab};
 
 /// `Params` of `common.wgsl`.
@@ -101,18 +99,12 @@ const MOST_COLUMNS: u64 = {
 };
 
 impl<'a> Layout<'a> {
-    pub(crate) fn new(
-        gpu: &Gpu,
-        job: &Job,
-        cutoff: Cutoff,
-        mesh: &'a GpuMesh,
-        volume: &'a GpuVolume,
-        scratch: &Scratch,
-        run: u32,
-    ) -> Result<Self, GpuError> {
+    pub(crate) fn new(setting: &Setting<'a>, run: u32) -> Result<Self, GpuError> {
+        let Setting { gpu, job, cutoff, mesh, volume, ref scratch, .. } = *setting;
+        let appends = setting.variant.sink.entry_words() > 0;
         let largest = volume.slabs().iter().flat_map(|slab| projection(job, slab).0).max();
         let target_size = largest.unwrap_or(1).min(gpu.limits().target_size);
-        let max_columns = limits::columns_per_invocation(job.mode(), job.overlap_steps());
+        let max_columns = limits::columns_per_invocation(job.mode(), job.overlap_steps(), appends);
         let mut sets = ParameterSets { bytes: vec![], stride: gpu.limits().parameter_stride as usize };
         let mut laid_out = vec![];
         for slab in volume.slabs() {

@@ -13,12 +13,21 @@ pub(crate) const MAX_PAIRS: u32 = 65_535 * 64 * 1024;
 /// Voxels along each axis of a tile of `tiled`, as logarithms: a column of it is one word.
 pub(crate) const TILE_SHIFT: [u32; 3] = [4, 4, 5];
 
+/// Likewise of tiles whose voxels have values, the largest first: each value of a voxel takes four bytes of a workgroup's
+/// memory, and smaller tiles take more pairs.
+pub(crate) const TARGET_TILES: [[u32; 3]; 3] = [[3, 3, 5], [3, 2, 5], [2, 2, 5]];
+
 /// Pairs of triangle and tile that `tiled` sorts at a time: 8 bytes each, twice.
 pub(crate) const TILE_ROUND: u32 = 1 << 22;
 
 /// Pairs that one workgroup of `tiled` takes: 64 an invocation, whose at most 512 columns keep its loops short of
 /// [`SAFE_ITERATIONS`].
 pub(crate) const TILE_SHARE: u32 = 64 * WORKGROUP;
+
+/// Likewise where voxels have values, which costs an iteration a voxel: 16 an invocation. In a tile of 8 x 8 x 32 a triangle
+/// has at most 256 columns, and invocations that run in step take up to 4 iterations for bits along z and 4 for those across:
+/// 2300 iterations, or along slices 64 columns of 32 voxels.
+pub(crate) const TARGET_SHARE: u32 = 16 * WORKGROUP;
 
 /// Invocations of a workgroup.
 pub(crate) const WORKGROUP: u32 = 64;
@@ -40,6 +49,8 @@ pub(crate) struct Limits {
     pub(crate) groups: u32,
     /// Bytes between the parameter sets of consecutive dispatches.
     pub(crate) parameter_stride: u32,
+    /// Bytes of a workgroup's own memory.
+    pub(crate) workgroup_bytes: u32,
 }
 
 impl Limits {
@@ -52,6 +63,7 @@ impl Limits {
             target_size: device.max_texture_dimension_2d.min(8192),
             groups: device.max_compute_workgroups_per_dimension.min(65_535),
             parameter_stride: device.min_uniform_buffer_offset_alignment.max(256),
+            workgroup_bytes: device.max_compute_workgroup_storage_size,
         }
     }
 
@@ -74,10 +86,16 @@ impl Limits {
 }
 
 /// Columns of one triangle that one invocation may take, so that every driver finishes its loops.
-pub(crate) fn columns_per_invocation(mode: Mode, overlap_steps: u32) -> u32 {
+///
+/// Voxels that are appended to a list take an iteration each, and invocations that run in step those of all their branches:
+/// at most 8 for bits along z and 4 for those across, or 14 for the doubled cubes of a solid's shell.
+pub(crate) fn columns_per_invocation(mode: Mode, overlap_steps: u32, appends: bool) -> u32 {
     let overlap_voxels = overlap_steps.div_ceil(1 << STEP_BITS);
-    match mode {
-        Mode::Sliced => SAFE_ITERATIONS / 4 / (3 + 2 * overlap_voxels.div_ceil(32)),
-        _ => SAFE_ITERATIONS / 4,
+    let words = 3 + 2 * overlap_voxels.div_ceil(32);
+    match (mode, appends) {
+        (Mode::Sliced, true) => SAFE_ITERATIONS / (1 + 33 * words),
+        (Mode::Sliced, false) => SAFE_ITERATIONS / 4 / words,
+        (_, true) => SAFE_ITERATIONS / 16,
+        (_, false) => SAFE_ITERATIONS / 4,
     }
 }

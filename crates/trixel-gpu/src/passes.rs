@@ -15,13 +15,23 @@ use crate::limits::WORKGROUP;
 use crate::mesh::GpuMesh;
 use crate::pipelines::bind;
 use crate::scratch::{List, Lists, ScanBuffers, Scratch, Status};
-use crate::shader::{Drawn, Raster, Stage, Variant};
+use crate::shader::{Drawn, Raster, Sink, Stage, Variant};
 use crate::timer::Timer;
 use crate::volume::{GpuVolume, Slab};
 use crate::voxelizer::Classification;
 
 /// Offset of a dispatch's arguments after those of a draw, in `arguments.wgsl`.
 const DISPATCH_OFFSET: u64 = 16;
+
+/// Where voxels go beside the bits.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Appending<'a> {
+    pub(crate) sink: Sink,
+    /// What stages that write voxels are bound to for it.
+    pub(crate) buffers: &'a [&'a wgpu::Buffer],
+    /// How many pairs of triangle and tile each unit has, where they were counted before.
+    pub(crate) pairs: Option<&'a [u32]>,
+}
 
 /// All that a recording depends on.
 pub(crate) struct Setting<'a> {
@@ -33,8 +43,7 @@ pub(crate) struct Setting<'a> {
     pub(crate) whole_below: u32,
     pub(crate) mesh: &'a GpuMesh,
     pub(crate) volume: &'a GpuVolume,
-    /// The list that voxels are appended to, where the variant's sink has one.
-    pub(crate) appended: Option<&'a wgpu::Buffer>,
+    pub(crate) appending: Appending<'a>,
     pub(crate) scratch: &'a mut Scratch,
     pub(crate) timer: Option<&'a mut Timer>,
 }
@@ -97,6 +106,16 @@ pub(crate) fn record_classification(
     Ok(Classification { units, mode, dilation })
 }
 
+/// Records the counting of each unit's pairs of triangle and tile.
+pub(crate) fn record_pair_counts(setting: Setting<'_>, encoder: &mut wgpu::CommandEncoder) -> Result<(), GpuError> {
+    let (mut recorder, layout) = Recorder::begin(setting, encoder)?;
+    for unit in layout.parts.iter().flat_map(|part| &part.units) {
+        recorder.count_tiles(unit)?;
+    }
+    recorder.end(&layout);
+    Ok(())
+}
+
 struct Recorder<'a> {
     setting: Setting<'a>,
     encoder: &'a mut wgpu::CommandEncoder,
@@ -113,15 +132,16 @@ impl<'a> Recorder<'a> {
         setting: Setting<'a>,
         encoder: &'a mut wgpu::CommandEncoder,
     ) -> Result<(Recorder<'a>, Layout<'a>), GpuError> {
-        let Setting { gpu, job, cutoff, mesh, volume, .. } = setting;
+        let Setting { gpu, mesh, volume, appending: Appending { sink, buffers, .. }, .. } = setting;
         let status = setting.scratch.next_status(gpu, Layout::units(mesh, volume) as u64)?;
-        let layout = Layout::new(gpu, job, cutoff, mesh, volume, setting.scratch, status.run)?;
+        let layout = Layout::new(&setting, status.run)?;
         encoder.clear_buffer(&setting.scratch.counters, 0, None);
         encoder.clear_buffer(&status.buffer, 0, None);
         let (target_size, capacity) = (layout.target_size, layout.most_triangles);
-        let append_group = setting
-            .appended
-            .map(|appended| bind(gpu, &gpu.pipelines().layouts().append, &[appended.as_entire_binding()]));
+        let append_group = gpu.pipelines().layouts().appending(sink).filter(|_| !buffers.is_empty()).map(|layout| {
+            let buffers: Vec<_> = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
+            bind(gpu, layout, &buffers)
+        });
         Ok((Self { setting, encoder, status, target_size, capacity, append_group }, layout))
     }
 

@@ -62,6 +62,8 @@ pub(crate) struct Layouts {
     pub(crate) sort: wgpu::BindGroupLayout,
     /// Group 2 of stages that append voxels to a list.
     pub(crate) append: wgpu::BindGroupLayout,
+    /// Group 2 of those that blend what triangles paint.
+    pub(crate) targets: wgpu::BindGroupLayout,
 }
 
 impl Layouts {
@@ -90,6 +92,16 @@ impl Layouts {
             find_tiles: layout(device, &[read, read, write]),
             sort: layout(device, &[Slot::Parameters, read, write, write]),
             append: layout(device, &[Slot::Write(writers)]),
+            targets: layout(device, &[write, read]),
+        }
+    }
+
+    /// Group 2 of stages that write voxels.
+    pub(crate) fn appending(&self, sink: Sink) -> Option<&wgpu::BindGroupLayout> {
+        match sink {
+            Sink::Bits => None,
+            Sink::Targets(_) => Some(&self.targets),
+            Sink::List | Sink::Fragments | Sink::Claims | Sink::Pairs | Sink::Shell => Some(&self.append),
         }
     }
 
@@ -119,7 +131,7 @@ impl Layouts {
             Stage::CountDigits | Stage::MoveEntries => &self.sort,
             _ => &self.common,
         };
-        let third = (sink != Sink::Bits && stage.writes_voxels()).then_some(&self.append);
+        let third = if stage.writes_voxels() { self.appending(sink) } else { None };
         let groups = if third.is_some() { 3 } else { 1 + usize::from(second.is_some()) };
         [Some(first), second, third].into_iter().take(groups).collect()
     }
@@ -195,7 +207,11 @@ impl Pipelines {
                 layout: Some(&layout),
                 module: &module,
                 entry_point: label,
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    // A tile clears its memory itself, and with values that is a good deal.
+                    zero_initialize_workgroup_memory: stage != Stage::Tiled,
+                    ..Default::default()
+                },
                 cache: None,
             })
         })

@@ -3,7 +3,7 @@
 use crate::counters;
 use crate::error::GpuError;
 use crate::gpu::Gpu;
-use crate::limits::{MAX_PAIRS, SCAN_BLOCK, TILE_SHARE, WORKGROUP};
+use crate::limits::{MAX_PAIRS, SCAN_BLOCK, WORKGROUP};
 use crate::pipelines::TARGET_FORMAT;
 
 /// What a [`crate::Voxelizer`] keeps. Handles of buffers are cheap to clone, and a recording that holds one keeps it alive
@@ -228,9 +228,9 @@ impl Scratch {
         }
     }
 
-    /// Buffers for so many pairs of a triangle and one of so many tiles.
-    pub(crate) fn tiles(&mut self, gpu: &Gpu, pairs: u32, tiles: u32) -> Result<TileBuffers, GpuError> {
-        let shares = pairs.min(tiles.saturating_add(pairs.div_ceil(TILE_SHARE)));
+    /// Buffers for so many pairs of a triangle and one of so many tiles, in shares of so many.
+    pub(crate) fn tiles(&mut self, gpu: &Gpu, pairs: u32, tiles: u32, share: u32) -> Result<TileBuffers, GpuError> {
+        let shares = pairs.min(tiles.saturating_add(pairs.div_ceil(share)));
         match &self.tiles {
             Some(kept) if holds(&kept.pairs[0], 2 * pairs) && kept.shares.size() >= 8 + 4 * u64::from(shares) => {
                 Ok(kept.clone())

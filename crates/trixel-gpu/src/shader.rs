@@ -3,7 +3,8 @@
 use trixel::Mode;
 
 use crate::cutoff::{Dilation, Heuristic};
-use crate::limits::{MAX_EXTENT, MAX_PAIRS, TILE_SHARE, TILE_SHIFT};
+use crate::limits::{MAX_EXTENT, MAX_PAIRS, TARGET_SHARE, TILE_SHARE, TILE_SHIFT};
+use crate::targets::Plan;
 use crate::tier::Tier;
 
 macro_rules! shader {
@@ -263,12 +264,14 @@ pub(crate) enum Sink {
     Pairs,
     /// Likewise the voxels whose doubled cubes a triangle meets, whatever the mode.
     Shell,
+    /// To the bits, and to a list with the values that their triangles blend: only tiles do that.
+    Targets(Plan),
 }
 
 impl Sink {
     fn code(self) -> u32 {
         match self {
-            Self::Bits | Self::Claims => 0,
+            Self::Bits | Self::Claims | Self::Targets(_) => 0,
             Self::List => 1,
             Self::Fragments => 2,
             Self::Pairs | Self::Shell => 3,
@@ -277,7 +280,7 @@ impl Sink {
 
     /// Whether the bits are looked at.
     pub(crate) fn has_bits(self) -> bool {
-        matches!(self, Self::Bits | Self::List | Self::Claims)
+        matches!(self, Self::Bits | Self::List | Self::Claims | Self::Targets(_))
     }
 
     /// Words of an entry of the list.
@@ -286,12 +289,23 @@ impl Sink {
             Self::Bits | Self::Claims => 0,
             Self::List | Self::Fragments => 2,
             Self::Pairs | Self::Shell => 3,
+            Self::Targets(plan) => 2 + plan.len(),
         }
+    }
+
+    /// Voxels along each axis of a tile, as logarithms.
+    pub(crate) fn tile(self) -> [u32; 3] {
+        if let Self::Targets(plan) = self { plan.tile() } else { TILE_SHIFT }
+    }
+
+    /// Pairs of triangle and tile that a workgroup takes.
+    pub(crate) fn tile_share(self) -> u32 {
+        if let Self::Targets(_) = self { TARGET_SHARE } else { TILE_SHARE }
     }
 
     fn files(self) -> &'static [&'static str] {
         match self {
-            Self::Bits | Self::Claims => shader!("entry" "no_append"),
+            Self::Bits | Self::Claims | Self::Targets(_) => shader!("entry" "no_append"),
             Self::List | Self::Fragments => shader!("entry" "append"),
             Self::Pairs | Self::Shell => shader!("entry" "append_pairs"),
         }
@@ -324,10 +338,20 @@ pub(crate) fn source(stage: Stage, variant: Variant, tier: Tier, max_groups: u32
         }
         Stage::CaseSizes => constants += &format!("const MAX_GROUPS: u32 = {max_groups}u;\n"),
         Stage::CountTiles | Stage::PairTiles | Stage::FindTiles | Stage::Tiled => {
-            let [x, y, z] = TILE_SHIFT;
+            let [x, y, z] = variant.sink.tile();
+            let share = variant.sink.tile_share();
             let words = 1u32 << (x + y);
             constants += &format!("const TILE_SHIFT: vec3<u32> = vec3<u32>({x}u, {y}u, {z}u);\n");
-            constants += &format!("const TILE_WORDS: u32 = {words}u;\nconst SHARE: u32 = {TILE_SHARE}u;\n");
+            constants += &format!("const TILE_WORDS: u32 = {words}u;\nconst SHARE: u32 = {share}u;\n");
+            match (stage, variant.sink) {
+                (Stage::Tiled, Sink::Targets(plan)) => {
+                    constants += &plan.blending();
+                    constants += &plan.painting();
+                    files.extend(shader!("targets"));
+                }
+                (Stage::Tiled, _) => files.extend(shader!("no_targets")),
+                _ => {}
+            }
         }
         Stage::TriangleParallel { defers } => {
             let (heuristic, vertices) = defers.unwrap_or((Heuristic::default(), 1));
@@ -456,6 +480,20 @@ mod tests {
             for variant in VARIANTS {
                 for tier in Tier::ALL {
                     assert_valid(&source(stage, variant, tier, 65_535), tier, &[stage.entry_point()]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_blend_of_targets_is_valid() {
+        for plan in Plan::samples() {
+            for mode in Mode::ALL {
+                for stage in [Stage::CountTiles, Stage::PairTiles, Stage::FindTiles, Stage::Tiled] {
+                    let variant = Variant { mode, counting: mode == Mode::Thin, sink: Sink::Targets(plan) };
+                    for tier in Tier::ALL {
+                        assert_valid(&source(stage, variant, tier, 65_535), tier, &[stage.entry_point()]);
+                    }
                 }
             }
         }

@@ -11,10 +11,11 @@ use crate::gpu::Gpu;
 use crate::limits::{MAX_PAIRS, WORKGROUP};
 use crate::lists::{self, GpuVoxelList, ListMethod};
 use crate::mesh::GpuMesh;
-use crate::passes;
+use crate::passes::{self, Appending};
 use crate::probe;
 use crate::scratch::{Lists, Scratch};
 use crate::shader::{Sink, Variant};
+use crate::targets::{self, GpuTargets, Target};
 use crate::timer::{PassTime, Timer};
 use crate::volume::GpuVolume;
 
@@ -157,7 +158,7 @@ impl Voxelizer {
         mesh: &GpuMesh,
         volume: &GpuVolume,
     ) -> Result<(), GpuError> {
-        self.record_with(encoder, mesh, volume, None, None)
+        self.record_with(encoder, mesh, volume, None, Appending::default())
     }
 
     /// Sorts the triangles of `mesh` into small and large, for [`Voxelizer::record_classified`]. Runs at once.
@@ -167,7 +168,9 @@ impl Voxelizer {
     pub fn classify(&mut self, mesh: &GpuMesh, volume: &GpuVolume) -> Result<Classification, GpuError> {
         self.submit(|voxelizer, encoder| {
             let gpu = voxelizer.gpu.clone();
-            gpu.guarded(|| passes::record_classification(voxelizer.setting(mesh, volume, None)?, encoder))?
+            gpu.guarded(|| {
+                passes::record_classification(voxelizer.setting(mesh, volume, Appending::default())?, encoder)
+            })?
         })
     }
 
@@ -183,7 +186,7 @@ impl Voxelizer {
         volume: &GpuVolume,
         classification: &Classification,
     ) -> Result<(), GpuError> {
-        self.record_with(encoder, mesh, volume, Some(classification), None)
+        self.record_with(encoder, mesh, volume, Some(classification), Appending::default())
     }
 
     fn record_with(
@@ -192,7 +195,7 @@ impl Voxelizer {
         mesh: &GpuMesh,
         volume: &GpuVolume,
         classification: Option<&Classification>,
-        appended: Option<(Sink, &wgpu::Buffer)>,
+        appending: Appending<'_>,
     ) -> Result<(), GpuError> {
         let strategy = if classification.is_some() { Strategy::HybridTwoPass } else { self.strategy };
         let initial = self.cpu_part(mesh)?;
@@ -205,7 +208,7 @@ impl Voxelizer {
         let gpu = self.gpu.clone();
         // One guard around everything: most of what is recorded is only checked by the driver much later.
         gpu.guarded(|| {
-            let setting = self.setting(mesh, volume, appended)?;
+            let setting = self.setting(mesh, volume, appending)?;
             passes::record(setting, encoder, strategy, classification, initial.as_ref())
         })?
     }
@@ -214,7 +217,7 @@ impl Voxelizer {
         &'a mut self,
         mesh: &'a GpuMesh,
         volume: &'a GpuVolume,
-        appended: Option<(Sink, &'a wgpu::Buffer)>,
+        appending: Appending<'a>,
     ) -> Result<passes::Setting<'a>, GpuError> {
         if volume.grid() != self.job.grid() {
             return Err(GpuError::GridMismatch);
@@ -225,13 +228,13 @@ impl Voxelizer {
         Ok(passes::Setting {
             gpu: &self.gpu,
             job: &self.job,
-            variant: Variant { sink: appended.map_or(Sink::Bits, |(sink, _)| sink), ..self.variant },
+            variant: Variant { sink: appending.sink, ..self.variant },
             dilation: self.dilation,
             cutoff: self.cutoff,
             whole_below: self.whole_below,
             mesh,
             volume,
-            appended: appended.map(|(_, buffer)| buffer),
+            appending,
             scratch: &mut self.scratch,
             timer: self.timer.as_mut(),
         })
@@ -275,9 +278,70 @@ impl Voxelizer {
         &mut self,
         mesh: &GpuMesh,
         volume: &GpuVolume,
-        appended: (Sink, &wgpu::Buffer),
+        (sink, list): (Sink, &wgpu::Buffer),
     ) -> Result<(), GpuError> {
-        self.submit(|voxelizer, encoder| voxelizer.record_with(encoder, mesh, volume, None, Some(appended))).map(drop)
+        self.run_into(mesh, volume, Appending { sink, buffers: &[list], pairs: None })
+    }
+
+    /// [`Voxelizer::run`] that also writes to what stages are bound to for a sink.
+    pub(crate) fn run_into(
+        &mut self,
+        mesh: &GpuMesh,
+        volume: &GpuVolume,
+        appending: Appending<'_>,
+    ) -> Result<(), GpuError> {
+        self.submit(|voxelizer, encoder| voxelizer.record_with(encoder, mesh, volume, None, appending))
+    }
+
+    /// How many pairs of triangle and tile there are, for each unit of the layout.
+    pub(crate) fn count_pairs(&mut self, mesh: &GpuMesh, volume: &GpuVolume, sink: Sink) -> Result<Vec<u32>, GpuError> {
+        self.submit(|voxelizer, encoder| {
+            let gpu = voxelizer.gpu.clone();
+            let counting = Appending { sink, ..Appending::default() };
+            gpu.guarded(|| passes::record_pair_counts(voxelizer.setting(mesh, volume, counting)?, encoder))?
+        })?;
+        Ok(self.results()?.1)
+    }
+
+    /// Voxelizes into `volume` as [`Voxelizer::run`] does, and blends render targets in the same pass: values of each set
+    /// voxel, in the memory of the workgroup that has its tile. After J. Pantaleoni, *VoxelPipe*, 2011. For strategy
+    /// [`Strategy::Tiled`] and every mode but solid, whose insides no triangle meets.
+    ///
+    /// How many targets there can be follows from the memory of a workgroup: 7 with WebGPU's 16 KiB, 15 with 32 KiB. Use
+    /// [`Voxelizer::attributes`] for what is not an integer of a triangle, such as colours of textures.
+    ///
+    /// ```no_run
+    /// use trixel::lattice::LatticeMesh;
+    /// use trixel::{Grid, Job, Mode, Strategy};
+    /// use trixel_gpu::{AdapterChoice, Gpu, GpuMesh, GpuVolume, Options, Target, Voxelizer};
+    ///
+    /// let mesh = trixel::scene::build("torus")?;
+    /// let grid = Grid::fit(&mesh.bounds().expect("a torus has triangles"), 256)?;
+    /// let job = Job::new(grid, Mode::Conservative).with_strategy(Strategy::Tiled);
+    /// let gpu = Gpu::open(&AdapterChoice::Any)?;
+    /// let on_gpu = GpuMesh::upload(&gpu, &LatticeMesh::snap(&mesh, &grid)?)?;
+    /// let voxels = GpuVolume::new(&gpu, grid)?;
+    /// let mut voxelizer = Voxelizer::new(&gpu, &job, &Options::default())?;
+    ///
+    /// let priorities: Vec<u32> = (0..mesh.triangles.len() as u32).map(|triangle| triangle % 5).collect();
+    /// let targets = [Target::ID, Target::COUNT, Target::max(&priorities)];
+    /// let blended = voxelizer.tiled_targets(&on_gpu, &voxels, &targets)?;
+    /// let voxels = blended.list().download(&gpu)?;
+    /// let values = blended.download(&gpu)?;
+    /// println!("{} triangles meet in voxel {:?}, the first is {}", values[1][0], voxels[0], values[0][0]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Voxelizer::run`], and when the job is of another strategy or solid, there are no targets or too many, values
+    /// are not one a triangle, a triangle is 8192 voxels or longer along an axis, or a list exceeds what the adapter binds.
+    pub fn tiled_targets(
+        &mut self,
+        mesh: &GpuMesh,
+        volume: &GpuVolume,
+        targets: &[Target<'_>],
+    ) -> Result<GpuTargets, GpuError> {
+        targets::blend(self, mesh, volume, targets)
     }
 
     /// The sorted list of the voxels of `mesh`, made by `method`; its bits, where it needs them, are its own. Use
@@ -369,6 +433,11 @@ impl Voxelizer {
     /// When triangles were too large or columns too many, so that the result must not be used, nothing was submitted, or the
     /// device is lost.
     pub fn check(&self) -> Result<Counters, GpuError> {
+        Ok(self.results()?.0)
+    }
+
+    /// [`Voxelizer::check`], with the pairs of each unit where any were counted.
+    fn results(&self) -> Result<(Counters, Vec<u32>), GpuError> {
         let status = self.scratch.status();
         let (counters, too_large, words) = self.gpu.read(&status.buffer, status.bytes(), |bytes| {
             let (counters, too_large) = counters::parse(bytes);
@@ -393,7 +462,7 @@ impl Voxelizer {
             }
             _ => {}
         }
-        Ok(counters)
+        Ok((counters, totals.to_vec()))
     }
 
     /// How long each pass of the last run took on the device; empty where the adapter has no timestamps.

@@ -101,6 +101,22 @@ fn many_fragments_of_few_voxels_are_merged() {
 }
 
 #[test]
+fn loops_that_append_stay_short() {
+    // As many columns as one invocation takes where nothing is appended, along every axis in lanes that run in step.
+    let walls: Vec<[[f64; 3]; 3]> = (0..16)
+        .map(|k| {
+            let high = 2.5 + k as f64;
+            let wall = [[1.0, 1.0, high], [126.0, 1.5, high + 50.0], [1.5, 126.0, high + 50.0]];
+            wall.map(|corner| std::array::from_fn(|axis| corner[(axis + k) % 3]))
+        })
+        .collect();
+    let mesh = zoo::soup(&walls);
+    let gpu = open("llvmpipe");
+    let grid = Grid::new([0.0; 3], [1.0; 3], [127; 3]).unwrap();
+    compare(&gpu, "walls", &mesh, grid, Strategy::TriangleParallel, &[Mode::Conservative, Mode::Sliced]);
+}
+
+#[test]
 fn triangles_of_the_cpu_are_in_the_list() {
     let mesh = zoo::merged(&[
         zoo::soup(&[[[-9000.0, -5000.5, 3.25], [9000.0, -4000.0, 7.75], [20.0, 9000.0, 2.5]]]),

@@ -21,9 +21,9 @@ use crate::error::GpuError;
 use crate::gpu::Gpu;
 use crate::kernel::{Bound, Dispatcher, Kernel};
 use crate::lists::{self, Entries, GpuVoxelList, ListMethod, Memory};
-use crate::prefix_sum::PrefixSum;
+use crate::rank::{Ranked, locate_words, rank};
 use crate::shader::Sink;
-use crate::volume::{GpuVolume, Slab};
+use crate::volume::GpuVolume;
 use crate::voxelizer::{Options, Voxelizer};
 
 pub(crate) use recipe::Recipe;
@@ -115,14 +115,6 @@ struct Batch {
     voxels: Range<u32>,
 }
 
-/// A slab of bits with the sums that give places.
-struct Ranked<'a> {
-    slab: &'a Slab,
-    sums: PrefixSum,
-    /// How many voxels come before each plane of constant x, of all slabs, and before what follows the last.
-    before: Vec<u32>,
-}
-
 /// All that the batches share.
 struct Work<'a> {
     gpu: &'a Gpu,
@@ -186,31 +178,6 @@ pub(crate) fn compute(
         surface: job.mode() != Mode::Solid,
         scratch_bytes,
     })
-}
-
-/// `Locate` of `locate.wgsl`.
-fn locate_words(volume: &GpuVolume, slab: &Slab, items: u32, batch_first: u32, first_triangle: u32) -> [u32; 6] {
-    [items, volume.grid().dims()[1], volume.column_words, slab.x(), batch_first, first_triangle]
-}
-
-/// The places of all slabs' voxels.
-fn rank<'a>(gpu: &Gpu, volume: &'a GpuVolume) -> Result<Vec<Ranked<'a>>, GpuError> {
-    let mut start = 0;
-    let ranked = volume.slabs().iter().map(|slab| {
-        let mut dispatcher = Dispatcher::new(gpu);
-        let sums = lists::count(&mut dispatcher, volume, slab)?;
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
-        let planes = gpu.storage("trixel planes", u64::from(slab.nx()) * 4, usage)?;
-        let words = locate_words(volume, slab, slab.nx(), 0, 0);
-        let buffers = [slab.buffer(), sums.numbers(), &planes].map(Bound::Buffer);
-        let bound = [vec![(0, Bound::Words(&words))], (1..).zip(buffers).collect()].concat();
-        dispatcher.dispatch(Kernel::CountBeforePlanes, &bound, slab.nx())?;
-        let read = dispatcher.read_words(&[(&planes, slab.nx() as usize), (sums.total(), 1)])?;
-        let before: Vec<u32> = read.into_iter().flatten().map(|place| place + start).collect();
-        start = before.last().copied().unwrap_or(start);
-        Ok(Ranked { slab, sums, before })
-    });
-    ranked.collect()
 }
 
 impl Work<'_> {
@@ -298,9 +265,10 @@ impl Work<'_> {
         let voxels = batch.voxels.end - batch.voxels.start;
         let window = GpuVolume::window(self.gpu, *volume.grid(), batch.x.clone())?;
         let guess = GUESSED_FRAGMENTS * u64::from(voxels) + 1024;
-        let (fragments, count) = lists::appended(&mut self.painter, &chunk.mesh, &window, self.sink, &[], guess)?;
-        let slab_first = ranked.before.first().copied().unwrap_or(0);
-        let first = batch.voxels.start - slab_first;
+        let (fragments, count) = lists::appended(self.gpu, self.sink.entry_words(), &[], guess, |list| {
+            self.painter.run_appending(&chunk.mesh, &window, (self.sink, list))
+        })?;
+        let first = batch.voxels.start - ranked.first();
         let words = locate_words(volume, ranked.slab, count, first, chunk.triangles.start);
         let buffers = [ranked.slab.buffer(), ranked.sums.numbers(), &fragments].map(Bound::Buffer);
         let bound = [vec![(0, Bound::Words(&words))], (1..).zip(buffers).collect()].concat();

@@ -28,24 +28,21 @@ fn begun(gpu: &Gpu, words: usize, capacity: u64, before: &[[u32; 2]]) -> Result<
     Ok(buffer)
 }
 
-/// Voxelizes into a list, again with more room where it was too short. Gives the buffer and how many entries it has.
-/// `capacity` is a guess; only entries of two words can be there `before`.
+/// Lets `run` voxelize into a list of entries of so many words, again with more room where it was too short. Gives the buffer
+/// and how many entries it has. `capacity` is a guess; only entries of two words can be there `before`.
 pub(crate) fn appended(
-    voxelizer: &mut Voxelizer,
-    mesh: &GpuMesh,
-    volume: &GpuVolume,
-    sink: Sink,
+    gpu: &Gpu,
+    words: usize,
     before: &[[u32; 2]],
     capacity: u64,
+    mut run: impl FnMut(&wgpu::Buffer) -> Result<(), GpuError>,
 ) -> Result<(wgpu::Buffer, u32), GpuError> {
-    let gpu = voxelizer.gpu().clone();
-    let words = sink.entry_words();
     let limit = (gpu.limits().binding_bytes / 4).saturating_sub(HEADER_WORDS as u64) / words.max(1) as u64;
     let mut capacity = capacity.min(limit);
     loop {
-        let buffer = begun(&gpu, words, capacity, before)?;
-        voxelizer.run_appending(mesh, volume, (sink, &buffer))?;
-        let header = Dispatcher::new(&gpu).read_words(&[(&buffer, HEADER_WORDS)])?.into_iter().flatten();
+        let buffer = begun(gpu, words, capacity, before)?;
+        run(&buffer)?;
+        let header = Dispatcher::new(gpu).read_words(&[(&buffer, HEADER_WORDS)])?.into_iter().flatten();
         let header: Vec<u32> = header.collect();
         let (count, wrapped) = (header.first().copied().unwrap_or(0), header.get(2).copied().unwrap_or(0));
         let needed = if wrapped == 0 { u64::from(count) } else { 1 << 32 };
@@ -91,7 +88,9 @@ pub(crate) fn append(
     let [x, y, z] = grid.dims().map(u64::from);
     let surface = 2 * (x * y + y * z + z * x);
     let guess = if merges { 2 * surface + 4 * mesh.triangles() } else { surface };
-    let (buffer, count) = appended(voxelizer, mesh, &volume, sink, &before, guess)?;
+    let (buffer, count) = appended(&gpu, sink.entry_words(), &before, guess, |list| {
+        voxelizer.run_appending(mesh, &volume, (sink, list))
+    })?;
     let mut memory = Memory::default();
     let entries = Entries::new(&gpu, count)?;
     let mut dispatcher = Dispatcher::new(&gpu);

@@ -5,10 +5,10 @@
 //! and the pairs are sorted and voxelized in as many rounds as that takes.
 
 use super::sums::WordSets;
-use super::{Recorder, bind, run, run_indirect};
+use super::{Recorder, Setting, bind, run, run_indirect};
 use crate::error::GpuError;
 use crate::layout::Unit;
-use crate::limits::{MAX_PAIRS, TILE_ROUND, TILE_SHIFT};
+use crate::limits::{MAX_PAIRS, TILE_ROUND};
 use crate::scratch::digit_counts;
 use crate::shader::Stage;
 use crate::volume::Slab;
@@ -19,23 +19,27 @@ const DIGIT_BITS: u32 = 4;
 const UNKNOWN_PAIRS: u64 = 1 << 20;
 
 /// Tiles that a slab meets.
-fn tiles_of(slab: &Slab, [_, ny, nz]: [u32; 3]) -> u64 {
+fn tiles_of(slab: &Slab, [_, ny, nz]: [u32; 3], [x, y, z]: [u32; 3]) -> u64 {
     let along = |shift: u32, first: u32, voxels: u32| u64::from(((first + voxels - 1) >> shift) - (first >> shift) + 1);
-    let [x, y, z] = TILE_SHIFT;
     along(x, slab.x(), slab.nx()) * along(y, 0, ny) * along(z, 0, nz)
 }
 
 impl Recorder<'_> {
     pub(super) fn tiled(&mut self, slab: &Slab, unit: &Unit<'_>) -> Result<(), GpuError> {
-        let (gpu, job) = (self.setting.gpu, self.setting.job);
+        let Setting { gpu, job, variant, appending, .. } = self.setting;
         // One number is that of no tile. A grid of more can only be a list's, without voxels of its own.
-        let Some(tiles) = u32::try_from(tiles_of(slab, job.grid().dims())).ok().filter(|tiles| *tiles < u32::MAX)
+        let Some(tiles) = u32::try_from(tiles_of(slab, job.grid().dims(), variant.sink.tile()))
+            .ok()
+            .filter(|tiles| *tiles < u32::MAX)
         else {
             return self.triangle_parallel(unit);
         };
         let triangles = unit.chunk.triangles;
         let overlap = job.overlap_steps().div_ceil(1 << trixel::lattice::STEP_BITS);
-        let known = unit.chunk.tiles.as_ref().map(|counts| counts.most(u64::from(tiles), overlap));
+        let known = match appending.pairs {
+            Some(counted) => counted.get(unit.index).map(|pairs| u64::from(*pairs)),
+            None => unit.chunk.tiles.as_ref().map(|counts| counts.most(u64::from(tiles), overlap)),
+        };
         let most = known.unwrap_or(8 * u64::from(triangles) + UNKNOWN_PAIRS);
         let most = u32::try_from(most).unwrap_or(u32::MAX).clamp(1, MAX_PAIRS);
         if known.is_none() {
@@ -44,11 +48,20 @@ impl Recorder<'_> {
         let binding_pairs = u32::try_from(gpu.limits().binding_bytes / 8).unwrap_or(u32::MAX);
         let capacity = most.min(TILE_ROUND).min(binding_pairs);
 
-        let layouts = gpu.pipelines().layouts();
-        let whole = wgpu::Buffer::as_entire_binding;
+        self.count_tiles(unit)?;
+        for first in (0..most).step_by(capacity as usize) {
+            self.tile_round(unit, [first, capacity.min(most - first)], tiles)?;
+        }
+        Ok(())
+    }
+
+    /// The pairs of each triangle, summed up.
+    pub(super) fn count_tiles(&mut self, unit: &Unit<'_>) -> Result<(), GpuError> {
+        let gpu = self.setting.gpu;
+        let triangles = unit.chunk.triangles;
         let scan = self.setting.scratch.scan(gpu, self.capacity)?;
         let sums = self.prefix_sums(&scan, triangles)?;
-        let counted = bind(gpu, &layouts.columns, &[whole(&scan.levels[0])]);
+        let counted = bind(gpu, &gpu.pipelines().layouts().columns, &[scan.counted().as_entire_binding()]);
         let count = self.pipeline(Stage::CountTiles);
         let groups = self.groups(triangles);
         let mut pass = self.pass("count tiles");
@@ -57,10 +70,6 @@ impl Recorder<'_> {
         drop(pass);
         let total = self.status.total_offset(unit.index);
         self.encoder.copy_buffer_to_buffer(&scan.total, 0, &self.status.buffer, total, 4);
-
-        for first in (0..most).step_by(capacity as usize) {
-            self.tile_round(unit, [first, capacity.min(most - first)], tiles)?;
-        }
         Ok(())
     }
 
@@ -70,7 +79,8 @@ impl Recorder<'_> {
         let layouts = gpu.pipelines().layouts();
         let whole = wgpu::Buffer::as_entire_binding;
         let scan = self.setting.scratch.scan(gpu, self.capacity)?;
-        let buffers = self.setting.scratch.tiles(gpu, length, tiles)?;
+        let share = self.setting.variant.sink.tile_share();
+        let buffers = self.setting.scratch.tiles(gpu, length, tiles, share)?;
         let round = bytemuck::cast_slice(&[first, length, tiles]).to_vec();
         let round = gpu.buffer_with("trixel round", &round, wgpu::BufferUsages::STORAGE)?;
 

@@ -8,8 +8,15 @@ fn tile_word(column: vec2<i32>) -> u32 {
     return (at.x << TILE_SHIFT.y) | at.y;
 }
 
+// The column of a word, from the tile's corner: the way back.
+fn column_of(word: u32) -> vec2<u32> {
+    return vec2<u32>(word >> TILE_SHIFT.y, word & ((1u << TILE_SHIFT.y) - 1u));
+}
+
 fn or_word(column: vec2<i32>, index: u32, bits: u32) {
-    atomicOr(&tile_words[tile_word(column)], bits);
+    let word = tile_word(column);
+    atomicOr(&tile_words[word], bits);
+    paint(word, bits);
 }
 
 fn flip_word(column: vec2<i32>, index: u32, bits: u32) {

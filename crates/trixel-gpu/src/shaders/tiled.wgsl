@@ -37,6 +37,7 @@ fn blend_share(start: u32, local: u32) {
         }
         let shape = shape_of(corners(pair.y));
         if (shape.flags & EMPTY) == 0u {
+            paint_with(pair.y);
             blend(triangle_of(shape));
         }
     }
@@ -52,6 +53,7 @@ fn tiled(
     let there = share < shares.invocations / WORKGROUP;
     for (var i = local; i < TILE_WORDS; i += WORKGROUP) {
         atomicStore(&tile_words[i], 0u);
+        begin_targets_of(i);
     }
     workgroupBarrier();
     if there {
@@ -66,12 +68,13 @@ fn tiled(
         for (var i = local; i < TILE_WORDS; i += WORKGROUP) {
             let bits = atomicLoad(&tile_words[i]);
             if bits != 0u {
-                let column = corner.xy + vec2<i32>(vec2<u32>(i >> TILE_SHIFT.y, i & ((1u << TILE_SHIFT.y) - 1u)));
+                let column = corner.xy + vec2<i32>(column_of(i));
                 if MODE == SOLID {
                     flip_voxels(column, u32(corner.z) >> 5u, bits);
                 } else {
                     or_voxels(column, u32(corner.z) >> 5u, bits);
                 }
+                write_targets(i, vec3<u32>(vec2<u32>(column), u32(corner.z)), bits);
             }
         }
         flush_counters();
