@@ -63,7 +63,7 @@ const LAYER: Cells = {
 /// The bit of a voxel.
 const fn bit<const SIDE: usize>(x: usize, y: usize, z: usize) -> Bits {
     let bit = 1u64 << ((SIDE * x + y) * SIDE + z);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "the halves")]
+    #[expect(clippy::cast_possible_truncation, reason = "the halves")]
     [bit as i32, (bit >> 32) as i32]
 }
 

@@ -167,7 +167,7 @@ fn flats<V: Simd, R: SurfaceRule>(
     let mut flattened = corners;
     for p in &mut flattened.0 {
         for i in 0..3 {
-            p[i] = p[i] - middle[i];
+            p[i] -= middle[i];
         }
         *p = [along_x.select(p[1], p[0]), along_z.select(p[1], p[2]), p[0]];
     }
@@ -184,7 +184,7 @@ fn flats<V: Simd, R: SurfaceRule>(
         let mut words = [[0; LANES]; 2];
         for lane in 0..LANES {
             let cube = spread(cells[lane], along_x >> lane & 1 != 0, along_z >> lane & 1 != 0);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "the halves")]
+            #[expect(clippy::cast_possible_truncation, reason = "the halves")]
             {
                 words[0][lane] = cube as i32;
                 words[1][lane] = (cube >> 32) as i32;
