@@ -1,9 +1,10 @@
-//! Voxelizes one mesh over and over on one thread, for a profiler:
+//! Voxelizes one mesh over and over, for a profiler:
 //! `cargo build --release -p trixel-bench --example hot_loop`, then
 //! `perf record target/release/examples/hot_loop MESH N MODE SECONDS` or `valgrind --tool=callgrind` of the same.
 //!
 //! MESH is a name from the benchmarks (a scene, or a model relative to the folder of meshes); MODE `conservative`, `thin`,
-//! `solid` or `sliced`. An optional fifth argument, `sse2`, `sse4.2` or `avx2`, limits the instructions.
+//! `solid` or `sliced`. A fifth argument is the number of threads, 1 without; a sixth, `sse2`, `sse4.2` or `avx2`, limits the
+//! instructions.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark")]
 
@@ -15,7 +16,7 @@ use trixel::{Backend, CpuBackend, Grid, Instructions, Job, Mode, Volume};
 fn main() {
     let args: Vec<String> = std::env::args().collect();
     let [_, name, resolution, mode, seconds, rest @ ..] = args.as_slice() else {
-        println!("usage: hot_loop MESH N MODE SECONDS [INSTRUCTIONS]");
+        println!("usage: hot_loop MESH N MODE SECONDS [THREADS [INSTRUCTIONS]]");
         return;
     };
     let mesh = trixel_bench::load(name).unwrap();
@@ -23,13 +24,14 @@ fn main() {
     let grid = Grid::fit(&mesh.bounds().unwrap(), resolution.parse().unwrap()).unwrap();
     let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
     let mut volume = Volume::new(grid).unwrap();
-    let instructions = match rest.first().map(String::as_str) {
+    let instructions = match rest.get(1).map(String::as_str) {
         Some("sse2") => Instructions::Sse2,
         Some("sse4.2") => Instructions::Sse42,
         Some("avx2") => Instructions::Avx2,
         _ => Instructions::Best,
     };
-    let backend = CpuBackend::with_threads(1).unwrap().limited_to(instructions);
+    let threads = rest.first().map_or(1, |threads| threads.parse().unwrap());
+    let backend = CpuBackend::with_threads(threads).unwrap().limited_to(instructions);
     let job = Job::new(grid, mode);
     let limit = Duration::from_secs_f64(seconds.parse().unwrap());
     let mut times = Vec::new();

@@ -164,7 +164,7 @@ fn snap_narrow(positions: &[[f64; 3]], grid: &Grid) -> Option<Vec<[i32; 3]>> {
         snapped.par_chunks_mut(CHUNK).zip(positions.par_chunks(CHUNK)).map(snap_chunk).reduce(|| true, |a, b| a && b)
     };
     #[cfg(not(feature = "threads"))]
-    let fits = snapped.chunks_mut(CHUNK).zip(positions.chunks(CHUNK)).map(snap_chunk).fold(true, |a, b| a && b);
+    let fits = snapped.chunks_mut(CHUNK).zip(positions.chunks(CHUNK)).all(snap_chunk);
     fits.then_some(snapped)
 }
 

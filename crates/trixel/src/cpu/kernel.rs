@@ -14,7 +14,7 @@
 use fearless_simd::{Simd, i32x16, prelude::*};
 
 use super::number::SMALL_EXTENT;
-use super::rule::{Rule, Sliced, Solid, SurfaceRule};
+use super::rule::{Rule, Solid, SurfaceRule};
 use super::sink::{CubeSink, Sink};
 use super::triangles::{Block, LANES, Queue, Selected, Vectors};
 use super::{crossings, large, rows, tiny};
@@ -50,6 +50,13 @@ impl VoxelBox {
     pub(super) fn extent(&self) -> [i64; 3] {
         [self.high[0] - self.low[0], self.high[1] - self.low[1], self.high[2] - self.low[2]]
     }
+
+    /// Whether it is beyond small triangles' paths.
+    #[inline(always)]
+    fn is_long(&self) -> bool {
+        let extent = self.extent();
+        extent[0].max(extent[1]).max(extent[2]) > SMALL_EXTENT
+    }
 }
 
 /// Buffers that one thread keeps between triangles.
@@ -64,7 +71,7 @@ struct Scratch {
 pub(super) fn surface<V: Simd, R: SurfaceRule>(
     simd: V,
     rule: &R,
-    triangles: Selected<'_>,
+    triangles: &Selected<'_>,
     clip: &VoxelBox,
     sink: &mut impl CubeSink,
 ) {
@@ -125,20 +132,7 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
                 }
             }
             for lane in set_bits(meets & !two & !tiny) {
-                let triangle = triangles.corners(at + lane);
-                let around = VoxelBox::around(&triangle);
-                let Some(clipped) = around.clipped(clip) else { continue };
-                let extent = around.extent();
-                if R::TOUCH_IS_ENOUGH && extent[0].min(1) + extent[1].min(1) + extent[2].min(1) <= 1 {
-                    // Strictly inside a row of voxels.
-                    for x in clipped.low[0]..=clipped.high[0] {
-                        for y in clipped.low[1]..=clipped.high[1] {
-                            sink.run(x, y, clipped.low[2], clipped.high[2]);
-                        }
-                    }
-                    continue;
-                }
-                by_size(simd, rule, &triangle, &around, &clipped, sink, &mut scratch);
+                not_tiny(simd, rule, triangles, at + lane, clip, sink, &mut scratch);
             }
         },
     );
@@ -148,11 +142,57 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
     tiny::flush_flats(simd, rule, &mut waiting.flats, true, &near, sink);
 }
 
+/// [`surface`] for triangles that are not tiny.
+#[cfg(feature = "threads")]
+#[inline(always)]
+pub(super) fn surface_not_tiny<V: Simd, R: SurfaceRule>(
+    simd: V,
+    rule: &R,
+    triangles: &Selected<'_>,
+    clip: &VoxelBox,
+    sink: &mut impl Sink,
+) {
+    let mut scratch = Scratch::default();
+    for i in 0..triangles.len() {
+        not_tiny(simd, rule, triangles, i, clip, sink, &mut scratch);
+    }
+}
+
+/// Sends the voxels of the `i`th triangle in a surface mode.
+#[inline(always)]
+fn not_tiny<V: Simd, R: SurfaceRule>(
+    simd: V,
+    rule: &R,
+    triangles: &Selected<'_>,
+    i: usize,
+    clip: &VoxelBox,
+    sink: &mut impl Sink,
+    scratch: &mut Scratch,
+) {
+    let triangle = triangles.corners(i);
+    let around = VoxelBox::around(&triangle);
+    let Some(clipped) = around.clipped(clip) else { return };
+    if sink.leaves(triangles.number(i), [clipped.low[0], clipped.high[0]]) {
+        return;
+    }
+    let extent = around.extent();
+    if R::TOUCH_IS_ENOUGH && extent[0].min(1) + extent[1].min(1) + extent[2].min(1) <= 1 {
+        // Strictly inside a row of voxels.
+        for x in clipped.low[0]..=clipped.high[0] {
+            for y in clipped.low[1]..=clipped.high[1] {
+                sink.run(x, y, clipped.low[2], clipped.high[2]);
+            }
+        }
+        return;
+    }
+    by_size(simd, rule, &triangle, &around, &clipped, sink, scratch);
+}
+
 /// Calls `each` with the number of the first, the corners and the used lanes of every vector of triangles.
 #[inline(always)]
 fn for_each_vector<V: Simd>(
     simd: V,
-    triangles: Selected<'_>,
+    triangles: &Selected<'_>,
     base: [i64; 3],
     mut each: impl FnMut(usize, Vectors<V>, u64),
 ) {
@@ -235,7 +275,7 @@ impl Waiting {
 /// Sends the toggles of mode solid inside `clip` to `sink`: runs from the lowest voxel whose centre is not below the
 /// triangle to the top of the clip. A triangle below the clip gives whole columns.
 #[inline(always)]
-pub(super) fn solid<V: Simd>(simd: V, rule: &Solid, triangles: Selected<'_>, clip: &VoxelBox, sink: &mut impl Sink) {
+pub(super) fn solid<V: Simd>(simd: V, rule: &Solid, triangles: &Selected<'_>, clip: &VoxelBox, sink: &mut impl Sink) {
     let mut scratch = Scratch::default();
     let mut waiting = Queue::EMPTY;
     let base = triangles.base(clip);
@@ -266,34 +306,42 @@ pub(super) fn solid<V: Simd>(simd: V, rule: &Solid, triangles: Selected<'_>, cli
                 );
             }
             for lane in set_bits(some & !tiny) {
-                centre(simd, rule, &triangles.corners(at + lane), clip, sink, &mut scratch);
+                centre(simd, rule, triangles, at + lane, clip, sink, &mut scratch);
             }
         },
     );
     crossings::flush(simd, &mut waiting, true, &near, clip, sink);
 }
 
-/// Sends the voxels of mode sliced inside `clip` to `sink`.
+/// Sends the voxels of mode sliced, or the toggles of mode solid, inside `clip` to `sink`: one triangle after the other.
 #[inline(always)]
-pub(super) fn sliced<V: Simd>(simd: V, rule: &Sliced, triangles: Selected<'_>, clip: &VoxelBox, sink: &mut impl Sink) {
+pub(super) fn centres<V: Simd, R: Rule>(
+    simd: V,
+    rule: &R,
+    triangles: &Selected<'_>,
+    clip: &VoxelBox,
+    sink: &mut impl Sink,
+) {
     let mut scratch = Scratch::default();
     for i in 0..triangles.len() {
-        centre(simd, rule, &triangles.corners(i), clip, sink, &mut scratch);
+        centre(simd, rule, triangles, i, clip, sink, &mut scratch);
     }
 }
 
-/// Sends the voxels of a triangle in a mode that looks along z from voxel centres.
+/// Sends the voxels of the `i`th triangle in a mode that looks along z from voxel centres.
 #[inline(always)]
 fn centre<V: Simd, R: Rule>(
     simd: V,
     rule: &R,
-    triangle: &[[i64; 3]; 3],
+    triangles: &Selected<'_>,
+    i: usize,
     clip: &VoxelBox,
     sink: &mut impl Sink,
     scratch: &mut Scratch,
 ) {
     const HALF: i64 = (STEPS_PER_VOXEL / 2) as i64;
-    let [a, b, c] = triangle;
+    let triangle = triangles.corners(i);
+    let [a, b, c] = &triangle;
     // The columns whose centres are inside the closed box: for small triangles mostly none.
     let low = |i: usize| (a[i].min(b[i]).min(c[i]) - HALF + (2 * HALF - 1)) >> STEP_BITS;
     let high = |i: usize| (a[i].max(b[i]).max(c[i]) - HALF) >> STEP_BITS;
@@ -302,8 +350,10 @@ fn centre<V: Simd, R: Rule>(
         high: [high(0).min(clip.high[0]), high(1).min(clip.high[1]), clip.high[2]],
     };
     if columns.low[0] <= columns.high[0] && columns.low[1] <= columns.high[1] {
-        let around = VoxelBox::around(triangle);
-        by_size(simd, rule, triangle, &around, &columns, sink, scratch);
+        let around = VoxelBox::around(&triangle);
+        if !sink.leaves(triangles.number(i), [columns.low[0], columns.high[0]]) {
+            by_size(simd, rule, &triangle, &around, &columns, sink, scratch);
+        }
     }
 }
 
@@ -318,8 +368,7 @@ fn by_size<V: Simd, R: Rule>(
     sink: &mut impl Sink,
     scratch: &mut Scratch,
 ) {
-    let extent = around.extent();
-    if extent[0].max(extent[1]).max(extent[2]) <= SMALL_EXTENT && rule.fits_small() {
+    if !around.is_long() && rule.fits_small() {
         simd.vectorize(
             #[inline(always)]
             || rows::voxelize(simd, rule, triangle, around, clipped, sink, &mut scratch.rows),

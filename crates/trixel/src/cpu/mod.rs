@@ -21,6 +21,8 @@ mod instructions;
 mod kernel;
 mod large;
 pub(crate) mod number;
+#[cfg(feature = "threads")]
+mod outbox;
 mod painter;
 mod pillars;
 mod rows;

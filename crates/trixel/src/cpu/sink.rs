@@ -10,12 +10,19 @@ const WORD_SHIFT: u32 = WORD_BITS.trailing_zeros();
 pub(super) trait Sink {
     /// The voxels `(x, y, from..=to)`, all inside the clip that the kernel was given.
     fn run(&mut self, x: i64, y: i64, from: i64, to: i64);
+
+    /// Whether a triangle that is not tiny, of which the number and the range of x inside the clip are given, is left for
+    /// later.
+    #[inline(always)]
+    fn leaves(&mut self, _number: usize, _x: [i64; 2]) -> bool {
+        false
+    }
 }
 
 /// Receives cubes of voxels too, several at once.
 pub(super) trait CubeSink: Sink {
     /// Looks up cubes whose low corners, a row for each axis, are seen from the voxel `base`; along z, they are inside the
-    /// slab.
+    /// clip.
     fn places(&self, low: &[[i32; LANES]; 3], base: [i64; 3]) -> Places;
 
     /// Voxels of the cube of `SIDE` in a lane: those `(x, y, z)` from its low corner whose bit `(SIDE x + y) SIDE + z` is
@@ -23,10 +30,40 @@ pub(super) trait CubeSink: Sink {
     fn cube<const SIDE: usize>(&mut self, places: &Places, lane: usize, bits: u64);
 }
 
-/// Where the low corners of cubes are: from the slab's start on, and among its words.
+/// Where the low corners of cubes are: along x, and among a piece's words.
 pub(super) struct Places {
-    at: [[i64; LANES]; 3],
-    word: [usize; LANES],
+    pub(super) x: [i64; LANES],
+    /// Outside the piece: past its end, below 0, or a word for which no bit will be set.
+    pub(super) word: [isize; LANES],
+    pub(super) shift: [u32; LANES],
+}
+
+impl Places {
+    /// In a piece that starts at a voxel, for its columns along y and the words of a column.
+    #[inline(always)]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_possible_wrap,
+        reason = "within the piece or a few voxels beside it"
+    )]
+    pub(super) fn new(
+        low: &[[i32; LANES]; 3],
+        base: [i64; 3],
+        start: [i64; 3],
+        columns: usize,
+        column_words: usize,
+    ) -> Self {
+        let mut places = Self { x: [0; LANES], word: [0; LANES], shift: [0; LANES] };
+        for lane in 0..LANES {
+            let at = |i: usize| i64::from(low[i][lane]) + (base[i] - start[i]);
+            let z = at(2);
+            places.x[lane] = at(0);
+            places.word[lane] = ((at(0) * columns as i64 + at(1)) * column_words as i64 + (z >> WORD_SHIFT)) as isize;
+            places.shift[lane] = z as u32 % WORD_BITS;
+        }
+        places
+    }
 }
 
 /// The words of a piece of the grid: what one thread owns.
@@ -39,10 +76,16 @@ pub(super) struct Slab<'a> {
     pub(super) column_words: usize,
 }
 
-impl Slab<'_> {
+impl<'a> Slab<'a> {
     /// The same piece, for a shorter time.
     pub(super) fn reborrow(&mut self) -> Slab<'_> {
         Slab { words: self.words, ..*self }
+    }
+
+    /// Words of a layer across x.
+    #[inline(always)]
+    fn layer(&self) -> usize {
+        self.columns * self.column_words
     }
 
     #[inline(always)]
@@ -52,17 +95,16 @@ impl Slab<'_> {
         let start = (x * self.columns + y) * self.column_words;
         &mut self.words[start..start + self.column_words]
     }
-}
 
-impl Slab<'_> {
-    /// Sets the voxels of a cube whose columns' bits are in the words after `first`: all columns without asking which
+    /// Sets the voxels of a cube whose columns' bits are in the words from `first` on: all columns without asking which
     /// have any, as that guess is wrong too often. `false`, and nothing done, where not all are in the slab.
     #[inline(always)]
-    fn set_cube<const SIDE: usize>(&mut self, first: usize, bits: u64, shift: u32) -> bool {
-        let (beside, layer) = (self.column_words, self.columns * self.column_words);
+    #[expect(clippy::cast_sign_loss, reason = "too large, then")]
+    fn set_cube<const SIDE: usize>(&mut self, first: isize, bits: u64, shift: u32) -> bool {
+        let (beside, layer) = (self.column_words, self.layer());
         let last = (SIDE - 1) * (layer + beside);
         // At the end of a row, the column beside is the first of the next: its bits are 0 then.
-        let Some(words) = self.words.get_mut(first..).filter(|words| words.len() > last) else {
+        let Some(words) = self.words.get_mut(first as usize..).filter(|words| words.len() > last) else {
             return false;
         };
         for x in 0..SIDE {
@@ -73,6 +115,43 @@ impl Slab<'_> {
         }
         true
     }
+
+    /// Sets the voxels of a cube whose columns' bits are in the words from `first` on, which may lie outside the slab as
+    /// long as its voxels do not.
+    #[inline(always)]
+    pub(super) fn paint_cube<const SIDE: usize>(&mut self, first: isize, bits: u64, shift: u32) {
+        if shift > WORD_BITS - side::<SIDE>() || !self.set_cube::<SIDE>(first, bits, shift) {
+            self.set_columns::<SIDE>(first, bits, shift);
+        }
+    }
+
+    /// [`Self::paint_cube`], column by column.
+    #[cold]
+    #[inline(never)]
+    #[expect(clippy::cast_sign_loss, reason = "voxels are inside the slab")]
+    fn set_columns<const SIDE: usize>(&mut self, first: isize, mut bits: u64, shift: u32) {
+        let side = side::<SIDE>();
+        while bits != 0 {
+            let column = bits.trailing_zeros() / side;
+            let run = bits >> (column * side) & ((1 << side) - 1);
+            bits ^= run << (column * side);
+            let (x, y) = ((column / side) as usize, (column % side) as usize);
+            let word = first.wrapping_add_unsigned(x * self.layer() + y * self.column_words) as usize;
+            self.words[word] |= run << shift;
+            if shift > WORD_BITS - side {
+                let above = run >> (WORD_BITS - shift);
+                if above != 0 {
+                    self.words[word + 1] |= above;
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "at most 4")]
+const fn side<const SIDE: usize>() -> u32 {
+    SIDE as u32
 }
 
 /// Sets the voxels of a run.
@@ -99,63 +178,23 @@ impl Sink for SetRuns<'_> {
 
 impl CubeSink for SetRuns<'_> {
     #[inline(always)]
+    #[expect(clippy::cast_sign_loss, reason = "too large, then")]
     fn places(&self, low: &[[i32; LANES]; 3], base: [i64; 3]) -> Places {
-        let Slab { words, start, columns, column_words } = &self.0;
-        let mut places = Places { at: [[0; LANES]; 3], word: [0; LANES] };
-        for i in 0..3 {
-            for lane in 0..LANES {
-                places.at[i][lane] = i64::from(low[i][lane]) + (base[i] - start[i]);
-            }
-        }
-        let [xs, ys, zs] = &places.at;
-        for lane in 0..LANES {
-            // Outside the slab this is a word past its end, or one for which no bit will be set.
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                clippy::cast_possible_wrap,
-                reason = "see above"
-            )]
-            {
-                let column = xs[lane] * *columns as i64 + ys[lane];
-                places.word[lane] = (column * *column_words as i64 + (zs[lane] >> WORD_SHIFT)) as usize;
-            }
-        }
+        let places = Places::new(low, base, self.0.start, self.0.columns, self.0.column_words);
         // Reads what will be changed, so that the memory is under way while voxels are still computed.
-        let layer = columns * column_words;
+        let (words, layer) = (&self.0.words, self.0.layer());
         let mut seen = 0;
         for &word in &places.word {
-            seen |= words.get(word).copied().unwrap_or(0);
-            seen |= words.get(word.wrapping_add(layer)).copied().unwrap_or(0);
+            seen |= words.get(word as usize).copied().unwrap_or(0);
+            seen |= words.get((word as usize).wrapping_add(layer)).copied().unwrap_or(0);
         }
         std::hint::black_box(seen);
         places
     }
 
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
-    fn cube<const SIDE: usize>(&mut self, places: &Places, lane: usize, mut bits: u64) {
-        let side = SIDE as u32;
-        let low = [0, 1, 2].map(|i| places.at[i][lane]);
-        let shift = low[2] as u32 % WORD_BITS;
-        if shift <= WORD_BITS - side && self.0.set_cube::<SIDE>(places.word[lane], bits, shift) {
-            return;
-        }
-        let word = (low[2] >> WORD_SHIFT) as usize;
-        while bits != 0 {
-            let column = bits.trailing_zeros() / side;
-            let run = bits >> (column * side) & ((1 << side) - 1);
-            bits ^= run << (column * side);
-            let at = [low[0] + i64::from(column / side), low[1] + i64::from(column % side)];
-            let words = self.0.column(at[0] + self.0.start[0], at[1] + self.0.start[1]);
-            words[word] |= run << shift;
-            if shift > WORD_BITS - side {
-                let above = run >> (WORD_BITS - shift);
-                if above != 0 {
-                    words[word + 1] |= above;
-                }
-            }
-        }
+    fn cube<const SIDE: usize>(&mut self, places: &Places, lane: usize, bits: u64) {
+        self.0.paint_cube::<SIDE>(places.word[lane], bits, places.shift[lane]);
     }
 }
 

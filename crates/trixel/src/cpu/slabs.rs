@@ -1,7 +1,9 @@
-//! The grid cut along x into slabs of whole columns, one task each, so that threads never write the same word.
+//! The grid cut along x into slabs of whole columns, so that threads never write the same word.
 //!
-//! With one thread there is one slab and no sorting. With more, triangles are first sorted into the slabs that they
-//! meet; slabs are cut so that each holds about the same work, and there are several a thread to level the rest.
+//! With one thread there is one slab. With more, threads first take triangles as they come and sort them into slabs: tiny
+//! ones are decided at once, and their voxels kept in an [`outbox`](super::outbox); the others are for every slab that they
+//! meet. Then the slabs are painted, one a thread at a time: nobody waits for memory that another has changed, and what is
+//! painted fits a cache. Slabs hold about the same work each, and there are several a thread to level the rest.
 
 use super::kernel::VoxelBox;
 use super::painter::Painter;
@@ -12,13 +14,27 @@ use crate::volume::Volume;
 
 /// Clears the volume and sets the voxels of the painter's mode.
 pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
-    let nz = volume.grid().dims()[2];
-    for_each_slab(mesh, volume, |mut slab, clip, indices| {
-        painter.paint(Selected { mesh, indices }, clip, slab.reborrow());
-        if painter.toggles() {
-            prefix_xor(slab.words, slab.column_words, nz);
+    let dims = volume.grid().dims();
+    #[cfg(feature = "threads")]
+    {
+        /// Below this many triangles' worth of work, waking threads costs more than it saves.
+        const WORTH_THREADS: u64 = 2000;
+        let threads = rayon::current_num_threads();
+        // Outboxes have triangles as 32-bit numbers.
+        let shared = dims[0] > 1 && u32::try_from(mesh.triangles.len()).is_ok();
+        if threads > 1 && shared && parallel::weight_at_least(mesh, volume, WORTH_THREADS) {
+            parallel::voxelize(painter, mesh, volume, threads);
+            return;
         }
-    });
+    }
+    let (columns, column_words) = (dims[1] as usize, volume.column_words());
+    volume.clear();
+    let mut slab = Slab { words: volume.words_mut(), start: [0; 3], columns, column_words };
+    let all = Selected::range(mesh, 0..mesh.triangles.len());
+    painter.paint(&all, &clip_of(dims, 0..dims[0]), slab.reborrow());
+    if painter.toggles() {
+        prefix_xor(slab.words, column_words, dims[2]);
+    }
 }
 
 /// The voxels with x in `x_range` (its end excluded).
@@ -27,43 +43,25 @@ fn clip_of(volume_dims: [u32; 3], x_range: std::ops::Range<u32>) -> VoxelBox {
     VoxelBox { low: [i64::from(x_range.start), 0, 0], high: [i64::from(x_range.end) - 1, ny - 1, nz - 1] }
 }
 
-#[cfg_attr(not(feature = "threads"), expect(unused_variables, reason = "only sorting looks at the mesh"))]
-fn for_each_slab(
-    mesh: &LatticeMesh<'_>,
-    volume: &mut Volume,
-    work: impl Fn(Slab<'_>, &VoxelBox, Option<&[u32]>) + Send + Sync,
-) {
-    #[cfg(feature = "threads")]
-    {
-        /// Below this many triangles' worth of work, sorting and waking threads costs more than it saves.
-        const WORTH_THREADS: u64 = 2000;
-        let threads = rayon::current_num_threads();
-        // Sorted triangles are 32-bit indices.
-        let sortable = volume.grid().dims()[0] > 1 && u32::try_from(mesh.triangles.len()).is_ok();
-        if threads > 1 && sortable && parallel::weight_at_least(mesh, volume, WORTH_THREADS) {
-            parallel::for_each_slab(mesh, volume, threads, work);
-            return;
-        }
-    }
-    let dims = volume.grid().dims();
-    let (columns, column_words) = (dims[1] as usize, volume.column_words());
-    volume.clear();
-    let slab = Slab { words: volume.words_mut(), start: [0; 3], columns, column_words };
-    work(slab, &clip_of(dims, 0..dims[0]), None);
-}
-
 #[cfg(feature = "threads")]
 mod parallel {
+    use std::ops::Range;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use rayon::prelude::*;
 
-    use super::{LatticeMesh, Slab, VoxelBox, clip_of};
+    use super::{LatticeMesh, Painter, Selected, VoxelBox, clip_of, prefix_xor};
+    use crate::cpu::outbox::{Cuts, Outbox};
     use crate::cpu::triangles::corners;
     use crate::volume::Volume;
 
-    /// Triangles sorted by one task.
-    const CHUNK: usize = 1 << 14;
+    /// Slabs a thread.
+    const SLABS: usize = 3;
+    /// Pieces of the triangles a thread, within limits of triangles.
+    const CHUNKS: usize = 32;
+    const CHUNK: Range<usize> = 1 << 10..1 << 12;
     /// Triangles that are looked at to cut the grid.
-    const SAMPLES: usize = 1 << 13;
+    const SAMPLES: usize = 1 << 11;
 
     /// The range of x that a triangle's box meets inside the grid, and the work that it stands for.
     #[inline(always)]
@@ -98,34 +96,45 @@ mod parallel {
         volume.words().len() > 1 << 18
     }
 
-    pub(super) fn for_each_slab(
-        mesh: &LatticeMesh<'_>,
-        volume: &mut Volume,
-        threads: usize,
-        work: impl Fn(Slab<'_>, &VoxelBox, Option<&[u32]>) + Send + Sync,
-    ) {
+    pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume, threads: usize) {
         let dims = volume.grid().dims();
-        let cuts = cut(mesh, dims, threads * 8);
-        let lists = sort(mesh, dims, &cuts);
-
-        let (columns, column_words) = (dims[1] as usize, volume.column_words());
-        let clean = volume.is_pristine();
-        let mut rest = volume.words_mut();
-        let mut slabs = Vec::with_capacity(lists.len());
-        for (range, list) in cuts.windows(2).zip(lists) {
-            let words = (range[1] - range[0]) as usize * columns * column_words;
-            let (mine, others) = rest.split_at_mut(words);
-            rest = others;
-            slabs.push((mine, range[0]..range[1], list));
-        }
-        slabs.into_par_iter().with_max_len(1).for_each(|(words, range, list)| {
-            if !clean {
-                words.fill(0);
+        let cuts = Cuts::new(cut(mesh, dims, threads * SLABS), dims[1] as usize, volume.column_words());
+        let mut outboxes: Vec<_> = (0..threads).map(|_| Outbox::new(&cuts)).collect();
+        let mut clean = volume.is_pristine();
+        let words = volume.words_mut();
+        let grid = clip_of(dims, 0..dims[0]);
+        let all = mesh.triangles.len();
+        let chunk = (all / (threads * CHUNKS)).clamp(CHUNK.start, CHUNK.end);
+        let taken = AtomicUsize::new(0);
+        loop {
+            outboxes.par_iter_mut().with_max_len(1).for_each(|outbox| {
+                outbox.clear();
+                while !outbox.is_full() {
+                    let start = taken.fetch_add(chunk, Ordering::Relaxed);
+                    if start >= all {
+                        break;
+                    }
+                    painter.sort(&Selected::range(mesh, start..all.min(start + chunk)), &grid, outbox);
+                }
+            });
+            let last = taken.load(Ordering::Relaxed) >= all;
+            cuts.slabs(words).into_par_iter().enumerate().with_max_len(1).for_each(|(i, mut slab)| {
+                if !clean {
+                    slab.words.fill(0);
+                }
+                let clip = clip_of(dims, cuts.x(i));
+                for outbox in &outboxes {
+                    painter.paint_sorted(mesh, outbox, i, &clip, &mut slab);
+                }
+                if last && painter.toggles() {
+                    prefix_xor(slab.words, slab.column_words, dims[2]);
+                }
+            });
+            if last {
+                break;
             }
-            let clip = clip_of(dims, range.clone());
-            let slab = Slab { words, start: [i64::from(range.start), 0, 0], columns, column_words };
-            work(slab, &clip, Some(&list));
-        });
+            clean = true;
+        }
     }
 
     /// Where to cut x so that each of up to `pieces` slabs holds about the same work; first 0, last nx.
@@ -170,42 +179,32 @@ mod parallel {
         }
         cuts
     }
+}
 
-    /// The indices of the triangles that meet each slab.
-    fn sort(mesh: &LatticeMesh<'_>, dims: [u32; 3], cuts: &[u32]) -> Vec<Vec<u32>> {
-        let slabs = cuts.len() - 1;
-        let mut slab_of_x = vec![0u32; dims[0] as usize];
-        for (slab, range) in (0u32..).zip(cuts.windows(2)) {
-            slab_of_x[range[0] as usize..range[1] as usize].fill(slab);
+#[cfg(all(test, feature = "threads"))]
+mod tests {
+    use crate::cpu::CpuBackend;
+    use crate::lattice::LatticeMesh;
+    use crate::{Backend, Grid, Job, Mode, Volume, scene};
+
+    /// Outboxes fill up several times, and every grid is cut through tiny triangles.
+    #[test]
+    fn threads_paint_what_one_thread_does() {
+        for (name, resolution) in [("sphere:48", 90), ("sphere:48", 33), ("room", 70)] {
+            let mesh = scene::build(name).unwrap();
+            let grid = Grid::fit(&mesh.bounds().unwrap(), resolution).unwrap();
+            let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
+            for mode in Mode::ALL {
+                let [one, seven] = [1, 7].map(|threads| {
+                    let mut volume = Volume::new(grid).unwrap();
+                    // What was there before does not matter.
+                    volume.words_mut().fill(u64::MAX);
+                    let backend = CpuBackend::with_threads(threads).unwrap();
+                    backend.voxelize(&lattice, &Job::new(grid, mode), &mut volume).unwrap();
+                    volume
+                });
+                assert!(one == seven, "{name}, {mode}, {resolution}");
+            }
         }
-        let nx = i64::from(dims[0]);
-        let sorted: Vec<Vec<Vec<u32>>> = mesh
-            .triangles
-            .par_chunks(CHUNK)
-            .enumerate()
-            .map(|(chunk, triangles)| {
-                let mut lists = vec![Vec::new(); slabs];
-                for (index, &triangle) in (chunk * CHUNK..).zip(triangles) {
-                    if let Some([low, high]) = x_range(&corners(mesh, triangle), nx) {
-                        for slab in slab_of_x[low]..=slab_of_x[high] {
-                            #[expect(clippy::cast_possible_truncation, reason = "checked by the caller")]
-                            lists[slab as usize].push(index as u32);
-                        }
-                    }
-                }
-                lists
-            })
-            .collect();
-        (0..slabs)
-            .into_par_iter()
-            .map(|slab| {
-                let length = sorted.iter().map(|lists| lists[slab].len()).sum();
-                let mut list = Vec::with_capacity(length);
-                for lists in &sorted {
-                    list.extend_from_slice(&lists[slab]);
-                }
-                list
-            })
-            .collect()
     }
 }

@@ -1,5 +1,7 @@
 //! Which triangles the kernel is to go through, and their corners: one by one, or in blocks for vectors.
 
+use std::ops::Range;
+
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, prelude::*};
 
 use super::kernel::VoxelBox;
@@ -13,25 +15,51 @@ pub(super) const LANES: usize = 16;
 pub(super) const BLOCK: usize = 64;
 
 /// Some triangles of a mesh, one after the other.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct Selected<'a> {
-    pub(super) mesh: &'a LatticeMesh<'a>,
-    /// The triangles, or `None` for all.
-    pub(super) indices: Option<&'a [u32]>,
+    mesh: &'a LatticeMesh<'a>,
+    which: Which<'a>,
 }
 
-impl Selected<'_> {
-    /// The number of triangles.
+#[derive(Clone)]
+enum Which<'a> {
+    Range(Range<usize>),
+    Listed(&'a [u32]),
+}
+
+impl<'a> Selected<'a> {
+    /// A range of the triangles.
+    pub(super) fn range(mesh: &'a LatticeMesh<'a>, range: Range<usize>) -> Self {
+        Self { mesh, which: Which::Range(range) }
+    }
+
+    /// Those of a list of numbers.
+    pub(super) fn listed(mesh: &'a LatticeMesh<'a>, numbers: &'a [u32]) -> Self {
+        Self { mesh, which: Which::Listed(numbers) }
+    }
+
+    /// How many there are.
     #[inline(always)]
     pub(super) fn len(&self) -> usize {
-        self.indices.map_or(self.mesh.triangles.len(), <[u32]>::len)
+        match &self.which {
+            Which::Range(range) => range.len(),
+            Which::Listed(numbers) => numbers.len(),
+        }
+    }
+
+    /// The number of the `i`th in the mesh.
+    #[inline(always)]
+    pub(super) fn number(&self, i: usize) -> usize {
+        match &self.which {
+            Which::Range(range) => range.start + i,
+            Which::Listed(numbers) => numbers[i] as usize,
+        }
     }
 
     /// The corners of the `i`th.
     #[inline(always)]
     pub(super) fn corners(&self, i: usize) -> [[i64; 3]; 3] {
-        let triangle = self.indices.map_or(i, |indices| indices[i] as usize);
-        corners(self.mesh, self.mesh.triangles[triangle])
+        corners(self.mesh, self.mesh.triangles[self.number(i)])
     }
 
     /// The voxel that the corners of blocks are seen from, so that they fit 32 bits wherever they may meet `clip`.
@@ -46,14 +74,15 @@ impl Selected<'_> {
     pub(super) fn load(&self, start: usize, base: [i64; 3], block: &mut Block) -> usize {
         let end = self.len().min(start + BLOCK);
         let all = &self.mesh.triangles;
-        match (&self.mesh.positions, self.indices) {
-            (LatticePositions::Narrow(positions), None) => {
-                block.fill(&all[start..end], |&triangle| triangle, |vertex| positions[vertex as usize]);
+        match (&self.mesh.positions, &self.which) {
+            (LatticePositions::Narrow(positions), Which::Range(range)) => {
+                let all = &all[range.start + start..range.start + end];
+                block.fill(all, |&triangle| triangle, |vertex| positions[vertex as usize]);
             }
-            (LatticePositions::Narrow(positions), Some(indices)) => {
-                block.fill(&indices[start..end], |&i| all[i as usize], |vertex| positions[vertex as usize]);
+            (LatticePositions::Narrow(positions), Which::Listed(numbers)) => {
+                block.fill(&numbers[start..end], |&i| all[i as usize], |vertex| positions[vertex as usize]);
             }
-            (LatticePositions::Wide(positions), indices) => {
+            (LatticePositions::Wide(positions), which) => {
                 // Beyond 32 bits, a corner is outside the clip by far; its triangle is not judged by these numbers.
                 #[expect(clippy::cast_possible_truncation, reason = "clamped")]
                 let near = |at: i64, base: i64| {
@@ -63,9 +92,11 @@ impl Selected<'_> {
                     let [x, y, z] = positions[vertex as usize];
                     [near(x, base[0]), near(y, base[1]), near(z, base[2])]
                 };
-                match indices {
-                    None => block.fill(&all[start..end], |&triangle| triangle, corner),
-                    Some(indices) => block.fill(&indices[start..end], |&i| all[i as usize], corner),
+                match which {
+                    Which::Range(range) => {
+                        block.fill(&all[range.start + start..range.start + end], |&triangle| triangle, corner);
+                    }
+                    Which::Listed(numbers) => block.fill(&numbers[start..end], |&i| all[i as usize], corner),
                 }
             }
         }

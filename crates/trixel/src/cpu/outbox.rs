@@ -1,0 +1,229 @@
+//! Where threads leave voxels for each other: an outbox a thread, with a compartment for each slab.
+
+use std::ops::Range;
+
+use super::sink::{CubeSink, Places, Sink, Slab};
+use super::triangles::LANES;
+use crate::volume::WORD_BITS;
+
+/// Where slabs begin and end along x.
+pub(super) struct Cuts {
+    /// The first x of each slab, and the grid's end.
+    at: Vec<u32>,
+    /// The slab of each x.
+    of_x: Vec<u32>,
+    columns: usize,
+    column_words: usize,
+}
+
+impl Cuts {
+    /// Slabs that begin at each but the last of `at`, which is the grid's end, for columns along y and words of a column.
+    pub(super) fn new(at: Vec<u32>, columns: usize, column_words: usize) -> Self {
+        let mut of_x = vec![];
+        for (slab, range) in (0u32..).zip(at.windows(2)) {
+            of_x.resize(range[1] as usize, slab);
+        }
+        Self { at, of_x, columns, column_words }
+    }
+
+    /// The number of slabs.
+    pub(super) fn len(&self) -> usize {
+        self.at.len() - 1
+    }
+
+    /// The x of a slab.
+    pub(super) fn x(&self, slab: usize) -> Range<u32> {
+        self.at[slab]..self.at[slab + 1]
+    }
+
+    /// Cuts the volume's words into slabs.
+    pub(super) fn slabs<'a>(&self, mut words: &'a mut [u64]) -> Vec<Slab<'a>> {
+        let mut slabs = vec![];
+        for slab in 0..self.len() {
+            let x = self.x(slab);
+            let (mine, rest) = words.split_at_mut(x.len() * self.layer());
+            words = rest;
+            let start = [i64::from(x.start), 0, 0];
+            slabs.push(Slab { words: mine, start, columns: self.columns, column_words: self.column_words });
+        }
+        slabs
+    }
+
+    /// The words of a layer across x.
+    #[inline(always)]
+    fn layer(&self) -> usize {
+        self.columns * self.column_words
+    }
+
+    /// The slab with x, if it is inside the grid.
+    #[inline(always)]
+    fn of(&self, x: i64) -> Option<usize> {
+        self.of_x.get(usize::try_from(x).ok()?).map(|&slab| slab as usize)
+    }
+}
+
+/// What waits for one slab.
+#[derive(Default)]
+struct Compartment {
+    /// Cubes of 2^3 voxels, or toggles: a place and the bits.
+    small: Vec<u64>,
+    /// Larger cubes: their bits, and a place with 0 or 1 for a side of 3 or 4.
+    cubes: Vec<[u64; 2]>,
+    /// The numbers of triangles to be voxelized inside the slab.
+    triangles: Vec<u32>,
+}
+
+/// What one thread has found for all slabs: the voxels of tiny triangles, and the numbers of all others.
+pub(super) struct Outbox<'a> {
+    cuts: &'a Cuts,
+    slabs: Vec<Compartment>,
+}
+
+/// Bits of a small cube.
+const SMALL_BITS: u32 = 8;
+/// Bits of a shift.
+const SHIFT_BITS: u32 = WORD_BITS.trailing_zeros();
+
+impl<'a> Outbox<'a> {
+    /// Entries that it should hold at most, or little more: 8 to 16 MiB, and so few in tests that some leave more.
+    const MOST_ENTRIES: usize = if cfg!(test) { 1 << 10 } else { 1 << 20 };
+
+    pub(super) fn new(cuts: &'a Cuts) -> Self {
+        Self { cuts, slabs: (0..cuts.len()).map(|_| Compartment::default()).collect() }
+    }
+
+    /// Whether the slabs should be painted before more is put in.
+    pub(super) fn is_full(&self) -> bool {
+        let entries = |slab: &Compartment| slab.small.len() + 2 * slab.cubes.len() + slab.triangles.len();
+        self.slabs.iter().map(entries).sum::<usize>() >= Self::MOST_ENTRIES
+    }
+
+    /// Forgets what was painted.
+    pub(super) fn clear(&mut self) {
+        for Compartment { small, cubes, triangles } in &mut self.slabs {
+            small.clear();
+            cubes.clear();
+            triangles.clear();
+        }
+    }
+
+    /// The triangles left to a slab.
+    pub(super) fn triangles(&self, slab: usize) -> &[u32] {
+        &self.slabs[slab].triangles
+    }
+
+    /// Sets the voxels left to a slab.
+    pub(super) fn set(&self, slab: usize, into: &mut Slab<'_>) {
+        for &entry in &self.slabs[slab].small {
+            let (word, shift) = self.unpack(entry >> SMALL_BITS);
+            into.paint_cube::<2>(word, entry & ((1 << SMALL_BITS) - 1), shift);
+        }
+        for &[bits, entry] in &self.slabs[slab].cubes {
+            let (word, shift) = self.unpack(entry >> 1);
+            if entry & 1 == 0 {
+                into.paint_cube::<3>(word, bits, shift);
+            } else {
+                into.paint_cube::<4>(word, bits, shift);
+            }
+        }
+    }
+
+    /// Toggles the voxels left to a slab.
+    pub(super) fn toggle(&self, slab: usize, into: &mut Slab<'_>) {
+        for &entry in &self.slabs[slab].small {
+            let (word, shift) = self.unpack(entry >> SMALL_BITS);
+            if let Some(word) = usize::try_from(word).ok().and_then(|word| into.words.get_mut(word)) {
+                *word ^= 1 << shift;
+            }
+        }
+    }
+
+    /// A word of the volume, as a slab sees it, and a shift.
+    #[inline(always)]
+    #[expect(
+        clippy::cast_sign_loss,
+        clippy::cast_possible_wrap,
+        reason = "cubes begin less than a layer before the slab"
+    )]
+    fn place(&self, slab: usize, word: isize, shift: u32) -> u64 {
+        let from_start = word + self.cuts.layer() as isize - (self.cuts.at[slab] as usize * self.cuts.layer()) as isize;
+        (from_start as u64) << SHIFT_BITS | u64::from(shift)
+    }
+
+    /// The opposite of [`Self::place`].
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "packed so")]
+    fn unpack(&self, place: u64) -> (isize, u32) {
+        ((place >> SHIFT_BITS) as isize - self.cuts.layer() as isize, place as u32 % WORD_BITS)
+    }
+
+    #[inline(always)]
+    fn push<const SIDE: usize>(&mut self, slab: usize, word: isize, bits: u64, shift: u32) {
+        let place = self.place(slab, word, shift);
+        if SIDE == 2 {
+            self.slabs[slab].small.push(place << SMALL_BITS | bits);
+        } else {
+            self.slabs[slab].cubes.push([bits, place << 1 | u64::from(SIDE == 4)]);
+        }
+    }
+
+    /// A cube that is not all in one slab, layer by layer.
+    #[cold]
+    #[inline(never)]
+    fn push_layers<const SIDE: usize>(&mut self, mut x: i64, mut word: isize, mut bits: u64, shift: u32) {
+        while bits != 0 {
+            let here = bits & ((1 << (SIDE * SIDE)) - 1);
+            if let Some(slab) = self.cuts.of(x).filter(|_| here != 0) {
+                self.push::<SIDE>(slab, word, here, shift);
+            }
+            bits >>= SIDE * SIDE;
+            x += 1;
+            word = word.wrapping_add_unsigned(self.cuts.layer());
+        }
+    }
+}
+
+impl Sink for Outbox<'_> {
+    /// A toggle: runs of other modes are their triangles'.
+    #[inline(always)]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_possible_wrap,
+        reason = "inside the grid"
+    )]
+    fn run(&mut self, x: i64, y: i64, from: i64, _to: i64) {
+        let Some(slab) = self.cuts.of(x) else { return };
+        let column = x as usize * self.cuts.columns + y as usize;
+        let word = column * self.cuts.column_words + (from as u32 / WORD_BITS) as usize;
+        self.push::<2>(slab, word as isize, 0, from as u32 % WORD_BITS);
+    }
+
+    #[inline(always)]
+    fn leaves(&mut self, number: usize, x: [i64; 2]) -> bool {
+        if let (Some(first), Some(last)) = (self.cuts.of(x[0]), self.cuts.of(x[1])) {
+            for slab in &mut self.slabs[first..=last] {
+                #[expect(clippy::cast_possible_truncation, reason = "meshes with more are voxelized by one thread")]
+                slab.triangles.push(number as u32);
+            }
+        }
+        true
+    }
+}
+
+impl CubeSink for Outbox<'_> {
+    #[inline(always)]
+    fn places(&self, low: &[[i32; LANES]; 3], base: [i64; 3]) -> Places {
+        Places::new(low, base, [0; 3], self.cuts.columns, self.cuts.column_words)
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_wrap, reason = "at most 4")]
+    fn cube<const SIDE: usize>(&mut self, places: &Places, lane: usize, bits: u64) {
+        let (x, word, shift) = (places.x[lane], places.word[lane], places.shift[lane]);
+        match (self.cuts.of(x), self.cuts.of(x + SIDE as i64 - 1)) {
+            (Some(slab), Some(last)) if slab == last => self.push::<SIDE>(slab, word, bits, shift),
+            _ => self.push_layers::<SIDE>(x, word, bits, shift),
+        }
+    }
+}
