@@ -103,35 +103,6 @@ impl Rule for Shell {
     }
 }
 
-/// An integer that divides.
-trait Divide: Int {
-    /// `floor(self / divisor)`, for a positive divisor.
-    fn div_floor(self, divisor: Self) -> Self;
-
-    /// A voxel's index; what is far outside every grid may be any other number far outside.
-    fn index(self) -> i64;
-}
-
-impl Divide for i64 {
-    fn div_floor(self, divisor: Self) -> Self {
-        self.div_euclid(divisor)
-    }
-
-    fn index(self) -> i64 {
-        self
-    }
-}
-
-impl Divide for i128 {
-    fn div_floor(self, divisor: Self) -> Self {
-        self.div_euclid(divisor)
-    }
-
-    fn index(self) -> i64 {
-        super::number::saturate(self)
-    }
-}
-
 /// The part of the box of voxels that the triangle's own box allows, or `None` if there is none, and the lowest voxel
 /// that the triangle's own box meets.
 fn clip<R: Rule>(
@@ -176,24 +147,24 @@ fn runs<R: Rule>(
 
 /// The bounds that `constraint` puts on b at `a`; `None` where it allows none.
 #[inline]
-fn narrow<T: Divide>(constraint: &Constraint<T>, a: i64, [mut low, mut high]: [i64; 2]) -> Option<[i64; 2]> {
+fn narrow<T: Int>(constraint: &Constraint<T>, a: i64, [mut low, mut high]: [i64; 2]) -> Option<[i64; 2]> {
     let zero = T::from(0);
     let at = constraint.t - constraint.na * T::from(a);
     if constraint.nb > zero {
-        low = low.max((-(-at).div_floor(constraint.nb)).index());
+        low = low.max((-(-at).div_floor(constraint.nb).0).saturate());
     } else if constraint.nb < zero {
-        high = high.min((-at).div_floor(-constraint.nb).index());
+        high = high.min((-at).div_floor(-constraint.nb).0.saturate());
     } else if at > zero {
         return None;
     }
     (low <= high).then_some([low, high])
 }
 
-fn narrow_all<T: Divide>(constraints: &[Constraint<T>], a: i64, range: [i64; 2]) -> Option<[i64; 2]> {
+fn narrow_all<T: Int>(constraints: &[Constraint<T>], a: i64, range: [i64; 2]) -> Option<[i64; 2]> {
     constraints.iter().try_fold(range, |range, constraint| narrow(constraint, a, range))
 }
 
-fn columns<R: Rule, T: Divide>(
+fn columns<R: Rule, T: Int>(
     rule: &R,
     triangle: &[[i64; 3]; 3],
     [from, to]: [[i64; 3]; 2],

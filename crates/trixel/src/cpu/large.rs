@@ -6,27 +6,34 @@
 //! to 5) with the loop over depth replaced by its closed form; cost follows columns, not voxels.
 
 use super::kernel::VoxelBox;
-use super::number::{FloorLine, div_floor, saturate};
+use super::number::{FloorLine, Int, MEDIUM_EXTENT};
 use super::rule::Rule;
 use super::setup::{Constraint, Setup};
 use super::sink::Sink;
 
 /// One bound on b that follows a: `low` (b at least) or not (b at most).
 #[derive(Clone, Copy)]
-struct Bound {
-    line: FloorLine,
+struct Bound<T> {
+    line: FloorLine<T>,
     low: bool,
 }
 
-impl Constraint<i128> {
+impl<T: Int> Constraint<T> {
+    /// The same in other integers, which hold it.
+    #[inline(always)]
+    fn narrowed(from: Constraint<i128>) -> Self {
+        Self { na: T::narrowed(from.na), nb: T::narrowed(from.nb), t: T::narrowed(from.t) }
+    }
+
     /// The bound on b from a = `start` on; `None` when the constraint does not involve b.
     #[inline(always)]
-    fn bound(self, start: i64) -> Option<Bound> {
-        let at_start = self.t - self.na * i128::from(start);
-        if self.nb > 0 {
+    fn bound(self, start: i64) -> Option<Bound<T>> {
+        let (zero, one) = (T::from(0), T::from(1));
+        let at_start = self.t - self.na * T::from(start);
+        if self.nb > zero {
             // b >= ceil((t - na a) / nb)
-            Some(Bound { line: FloorLine::new(at_start + self.nb - 1, -self.na, self.nb), low: true })
-        } else if self.nb < 0 {
+            Some(Bound { line: FloorLine::new(at_start + self.nb - one, -self.na, self.nb), low: true })
+        } else if self.nb < zero {
             // b <= floor((na a - t) / -nb)
             Some(Bound { line: FloorLine::new(-at_start, self.na, -self.nb), low: false })
         } else {
@@ -36,19 +43,19 @@ impl Constraint<i128> {
 }
 
 /// Up to five bounds on b for consecutive a.
-struct Bounds {
-    bounds: [Option<Bound>; 5],
+struct Bounds<T> {
+    bounds: [Option<Bound<T>>; 5],
     count: usize,
 }
 
-impl Bounds {
+impl<T: Int> Bounds<T> {
     #[inline(always)]
     fn new() -> Self {
         Self { bounds: [None; 5], count: 0 }
     }
 
     #[inline(always)]
-    fn push(&mut self, bound: Option<Bound>) {
+    fn push(&mut self, bound: Option<Bound<T>>) {
         if bound.is_some() {
             self.bounds[self.count] = bound;
             self.count += 1;
@@ -59,7 +66,7 @@ impl Bounds {
     #[inline(always)]
     fn next(&mut self, [mut low, mut high]: [i64; 2]) -> [i64; 2] {
         for bound in self.bounds[..self.count].iter_mut().flatten() {
-            let value = saturate(bound.line.quotient);
+            let value = bound.line.quotient.saturate();
             if bound.low {
                 low = low.max(value);
             } else {
@@ -90,25 +97,42 @@ pub(super) fn voxelize<R: Rule>(
     sink: &mut impl Sink,
     scratch: &mut Scratch,
 ) {
-    let base = around.low;
-    let setup = Setup::<i128>::new(triangle, base);
-    let low: [i64; 3] = std::array::from_fn(|i| clipped.low[i] - base[i]);
-    let high: [i64; 3] = std::array::from_fn(|i| clipped.high[i] - base[i]);
+    let extent = around.extent();
+    if extent[0].max(extent[1]).max(extent[2]) <= MEDIUM_EXTENT && rule.fits_small() {
+        runs::<i64, _>(rule, triangle, around.low, clipped, sink, scratch);
+    } else {
+        runs::<i128, _>(rule, triangle, around.low, clipped, sink, scratch);
+    }
+}
 
+/// [`voxelize`], following lines in integers that hold what is said at [`MEDIUM_EXTENT`].
+#[inline(always)]
+fn runs<T: Int, R: Rule>(
+    rule: &R,
+    triangle: &[[i64; 3]; 3],
+    base: [i64; 3],
+    clipped: &VoxelBox,
+    sink: &mut impl Sink,
+    scratch: &mut Scratch,
+) {
+    let setup = Setup::<i128>::new(triangle, base);
     if !R::SURFACE && setup.normal[2] == 0 {
         return;
     }
+    let low: [i64; 3] = std::array::from_fn(|i| clipped.low[i] - base[i]);
+    let high: [i64; 3] = std::array::from_fn(|i| clipped.high[i] - base[i]);
+    let (zero, one) = (T::from(0), T::from(1));
 
     let [mut x_low, mut x_high] = [low[0], high[0]];
     let mut y_by_x = Bounds::new();
-    let xy = setup.projection(rule, 0, 1);
+    let xy = setup.projection(rule, 0, 1).map(Constraint::<T>::narrowed);
     for constraint in xy {
-        if !R::SURFACE && constraint.nb == 0 {
+        if !R::SURFACE && constraint.nb == zero {
             // An edge along y limits x alone. (On surfaces the box already implies it.)
-            if constraint.na > 0 {
-                x_low = x_low.max(-saturate(div_floor(-constraint.t, constraint.na).0));
-            } else if constraint.na < 0 {
-                x_high = x_high.min(saturate(div_floor(-constraint.t, -constraint.na).0));
+            if constraint.na > zero {
+                x_low = x_low.max(-(-constraint.t).div_floor(constraint.na).0.saturate());
+            } else if constraint.na < zero {
+                x_high = x_high.min((-constraint.t).div_floor(-constraint.na).0.saturate());
             }
         } else {
             y_by_x.push(constraint.bound(x_low));
@@ -126,7 +150,8 @@ pub(super) fn voxelize<R: Rule>(
     }
 
     let (up, d1, d2) = setup.plane(rule);
-    let slanted = up[2] > 0;
+    let (up, d1, d2) = (up.map(T::narrowed), T::narrowed(d1), T::narrowed(d2));
+    let slanted = up[2] > zero;
     if !slanted {
         // A plane along z limits x and y only: two more edges. Where it is also along y or x, the box implies it.
         y_by_x.push(Constraint { na: up[0], nb: up[1], t: d1 }.bound(x_low));
@@ -136,27 +161,31 @@ pub(super) fn voxelize<R: Rule>(
     let mut z_by_x = Bounds::new();
     if R::SURFACE {
         let mut z_by_y = Bounds::new();
-        setup.projection(rule, 1, 2).into_iter().for_each(|c| z_by_y.push(c.bound(low[1])));
-        setup.projection(rule, 0, 2).into_iter().for_each(|c| z_by_x.push(c.bound(x_low)));
+        for constraint in setup.projection(rule, 1, 2) {
+            z_by_y.push(Constraint::<T>::narrowed(constraint).bound(low[1]));
+        }
+        for constraint in setup.projection(rule, 0, 2) {
+            z_by_x.push(Constraint::<T>::narrowed(constraint).bound(x_low));
+        }
         scratch.z_by_y.clear();
         scratch.z_by_y.extend((low[1]..=high[1]).map(|_| z_by_y.next([low[2], high[2]])));
     }
 
     if slanted {
         // z <= floor((d2 - N_x x - N_y y) / N_z), and the lower bound is `thickness` below it.
-        let (thickness, thickness_rest) = div_floor(d2 - d1, up[2]);
-        let mut top = FloorLine::new(0, -up[1], up[2]);
-        let mut at_row = d2 - up[0] * i128::from(x_low);
+        let (thickness, thickness_rest) = (d2 - d1).div_floor(up[2]);
+        let mut top = FloorLine::new(zero, -up[1], up[2]);
+        let mut at_row = d2 - up[0] * T::from(x_low);
         for x in x_low..=x_high {
             let [y_low, y_high] = y_by_x.next([low[1], high[1]]);
             let [z_low, z_high] = z_by_x.next([low[2], high[2]]);
             if y_low <= y_high && z_low <= z_high {
-                top.restart(at_row - up[1] * i128::from(y_low));
+                top.restart(at_row - up[1] * T::from(y_low));
                 for y in y_low..=y_high {
                     // ceil((d1 - L) / N) with d2 - L = q N + r and d2 - d1 = w N + s is q - w + (r > s).
-                    let carry = i128::from(top.remainder > thickness_rest);
-                    let mut from = saturate(top.quotient - thickness + carry).max(z_low);
-                    let mut to = saturate(top.quotient).min(z_high);
+                    let carry = if top.remainder > thickness_rest { one } else { zero };
+                    let mut from = (top.quotient - thickness + carry).saturate().max(z_low);
+                    let mut to = top.quotient.saturate().min(z_high);
                     if R::SURFACE {
                         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "y >= low[1]")]
                         let [y_from, y_to] = scratch.z_by_y[(y - low[1]) as usize];
@@ -172,7 +201,7 @@ pub(super) fn voxelize<R: Rule>(
                     top.advance();
                 }
             }
-            at_row -= up[0];
+            at_row = at_row - up[0];
         }
     } else {
         for x in x_low..=x_high {

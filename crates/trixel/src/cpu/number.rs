@@ -10,6 +10,15 @@ pub(crate) trait Int:
 {
     /// `floor(self / S)` with S the steps of a voxel.
     fn floor_voxels(self) -> Self;
+
+    /// `floor(self / divisor)` and the remainder, for `divisor > 0`.
+    fn div_floor(self, divisor: Self) -> (Self, Self);
+
+    /// A number that the caller knows to fit.
+    fn narrowed(from: i128) -> Self;
+
+    /// An index of a voxel from a quotient that may be far outside every grid.
+    fn saturate(self) -> i64;
 }
 
 /// The largest bounding box, in voxels along an axis less one, for which 64-bit arithmetic is exact.
@@ -20,10 +29,32 @@ pub(crate) trait Int:
 /// floor or ceiling: a quotient a / b that is no integer is at least 1 / b away from one, more than half an ulp.
 pub(crate) const SMALL_EXTENT: i64 = 63;
 
+/// The largest bounding box, in voxels along an axis less one, on which runs can follow lines in 64-bit arithmetic: with
+/// local coordinates of at most 2^25 steps, and thus normals of 2^50, a plane's bounds on voxel indices stay below
+/// 3 * 2^50 * 2^10. Finding them needs more.
+pub(super) const MEDIUM_EXTENT: i64 = 511;
+
 impl Int for i64 {
     #[inline(always)]
     fn floor_voxels(self) -> Self {
         self >> STEP_BITS
+    }
+
+    #[inline(always)]
+    fn div_floor(self, divisor: Self) -> (Self, Self) {
+        (self.div_euclid(divisor), self.rem_euclid(divisor))
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "the caller knows")]
+    fn narrowed(from: i128) -> Self {
+        debug_assert!(Self::try_from(from).is_ok_and(|number| number.abs() < 1 << 62), "{from} is too large");
+        from as Self
+    }
+
+    #[inline(always)]
+    fn saturate(self) -> i64 {
+        self
     }
 }
 
@@ -32,55 +63,57 @@ impl Int for i128 {
     fn floor_voxels(self) -> Self {
         self >> STEP_BITS
     }
-}
 
-/// An index of a voxel from a quotient that may be far outside every grid.
-#[inline(always)]
-pub(super) fn saturate(quotient: i128) -> i64 {
-    const LIMIT: i128 = 1 << 40;
-    #[expect(clippy::cast_possible_truncation, reason = "limited to 41 bits")]
-    {
-        quotient.clamp(-LIMIT, LIMIT) as i64
+    #[inline(always)]
+    fn div_floor(self, divisor: Self) -> (Self, Self) {
+        (self.div_euclid(divisor), self.rem_euclid(divisor))
     }
-}
 
-/// `floor(value / divisor)` and the remainder, for `divisor > 0`.
-#[inline(always)]
-pub(super) fn div_floor(value: i128, divisor: i128) -> (i128, i128) {
-    (value.div_euclid(divisor), value.rem_euclid(divisor))
+    #[inline(always)]
+    fn narrowed(from: i128) -> Self {
+        from
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "limited to 41 bits")]
+    fn saturate(self) -> i64 {
+        const LIMIT: i128 = 1 << 40;
+        self.clamp(-LIMIT, LIMIT) as i64
+    }
 }
 
 /// `floor((start + slope * i) / divisor)` for i = 0, 1, 2, ... with two divisions in all.
 #[derive(Clone, Copy)]
-pub(super) struct FloorLine {
-    pub(super) quotient: i128,
-    pub(super) remainder: i128,
-    step_quotient: i128,
-    step_remainder: i128,
-    divisor: i128,
+pub(super) struct FloorLine<T> {
+    pub(super) quotient: T,
+    pub(super) remainder: T,
+    step_quotient: T,
+    step_remainder: T,
+    divisor: T,
 }
 
-impl FloorLine {
-    pub(super) fn new(start: i128, slope: i128, divisor: i128) -> Self {
-        let (quotient, remainder) = div_floor(start, divisor);
-        let (step_quotient, step_remainder) = div_floor(slope, divisor);
+impl<T: Int> FloorLine<T> {
+    #[inline(always)]
+    pub(super) fn new(start: T, slope: T, divisor: T) -> Self {
+        let (quotient, remainder) = start.div_floor(divisor);
+        let (step_quotient, step_remainder) = slope.div_floor(divisor);
         Self { quotient, remainder, step_quotient, step_remainder, divisor }
     }
 
     /// Goes on to the next i.
     #[inline(always)]
     pub(super) fn advance(&mut self) {
-        self.quotient += self.step_quotient;
-        self.remainder += self.step_remainder;
+        self.quotient = self.quotient + self.step_quotient;
+        self.remainder = self.remainder + self.step_remainder;
         if self.remainder >= self.divisor {
-            self.remainder -= self.divisor;
-            self.quotient += 1;
+            self.remainder = self.remainder - self.divisor;
+            self.quotient = self.quotient + T::from(1);
         }
     }
 
     /// Goes to another start with the same slope and divisor.
     #[inline(always)]
-    pub(super) fn restart(&mut self, start: i128) {
-        (self.quotient, self.remainder) = div_floor(start, self.divisor);
+    pub(super) fn restart(&mut self, start: T) {
+        (self.quotient, self.remainder) = start.div_floor(self.divisor);
     }
 }

@@ -11,9 +11,13 @@ use super::kernel::VoxelBox;
 use super::rule::Rule;
 use super::setup::{Constraint, Setup};
 use super::sink::Sink;
+use crate::volume::WORD_BITS;
 
 /// Columns judged at once.
 const LANES: usize = 8;
+
+/// A number for each column `(x, y)` of eight by eight, at `8 x + y`.
+pub(super) type Tile = [i64; LANES * LANES];
 
 /// Columns along an axis of the largest box, rounded up to whole vectors.
 const MOST: usize = 64;
@@ -27,8 +31,8 @@ pub(super) struct Scratch {
     by_x: [[f64; MOST]; 2],
     by_y: [[f64; MOST]; 2],
     /// The ends of the runs of a tile of eight rows and eight columns.
-    starts: [i64; LANES * LANES],
-    ends: [i64; LANES * LANES],
+    starts: Tile,
+    ends: Tile,
 }
 
 impl Default for Scratch {
@@ -72,21 +76,19 @@ fn count_from<V: Simd>(simd: V, start: f64) -> f64x8<V> {
     f64x8::from_slice(simd, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]) + start
 }
 
-/// The range of z that the edges of a projection (a, z) leave at each a.
+/// The range of z that the edges of a projection (a, z) leave at each a. Without branches: which edges limit z from below
+/// is as good as random.
 #[inline(always)]
 fn z_range<V: Simd>(simd: V, edges: &[Edge; 3], a: f64x8<V>) -> (f64x8<V>, f64x8<V>) {
-    let mut low = f64x8::splat(simd, -FAR);
-    let mut high = f64x8::splat(simd, FAR);
+    let far = f64x8::splat(simd, FAR);
+    let (mut low, mut high) = (-far, far);
     for edge in edges {
         // A vertical edge constrains a alone, and the box already does.
-        if edge.nb != 0.0 {
-            let bound = (edge.t - a * edge.na) / edge.nb;
-            if edge.nb > 0.0 {
-                low = low.max(bound.ceil());
-            } else {
-                high = high.min(bound.floor());
-            }
-        }
+        let (at, nb) = (edge.t - a * edge.na, f64x8::splat(simd, edge.nb));
+        let bound = at / nb;
+        let zero = f64x8::splat(simd, 0.0);
+        low = low.max(nb.simd_gt(zero).select(bound.ceil(), -far));
+        high = high.min(nb.simd_lt(zero).select(bound.floor(), far));
     }
     (low, high)
 }
@@ -113,6 +115,8 @@ pub(super) fn voxelize<V: Simd, R: Rule>(
     let (up, d1, d2) = setup.plane(rule);
     #[expect(clippy::cast_precision_loss, reason = "below 2^53")]
     let (n, d2, thickness) = ([up[0] as f64, up[1] as f64, up[2] as f64], d2 as f64, (d2 - d1) as f64);
+    let thickness_whole = if n[2] > 0.0 { (thickness / n[2]).floor() } else { 0.0 };
+    let thickness_rest = thickness - thickness_whole * n[2];
 
     let Scratch { by_x, by_y, starts, ends } = scratch;
     if R::SURFACE {
@@ -120,9 +124,12 @@ pub(super) fn voxelize<V: Simd, R: Rule>(
         fill(simd, &projection(&setup, rule, 1, 2), low[1], high[1], by_y);
     }
 
-    let zero = f64x8::splat(simd, 0.0);
+    let (zero, one) = (f64x8::splat(simd, 0.0), f64x8::splat(simd, 1.0));
     let (box_low, box_high) = (f64x8::splat(simd, low[2]), f64x8::splat(simd, high[2]));
-    let base_z = f64x8::splat(simd, index(base[2]));
+    // Runs are seen from the word in which the lowest begins.
+    let start_z = clipped.low[2] & !i64::from(WORD_BITS - 1);
+    let to_word = f64x8::splat(simd, index(base[2] - start_z));
+    let last_z = clipped.high[2] - start_z;
     let mut y_start = low[1];
     let mut first = 0;
     while y_start <= high[1] {
@@ -152,8 +159,11 @@ pub(super) fn voxelize<V: Simd, R: Rule>(
                 let above = plane_at - n[0] * x;
                 let (mut from, mut to) = (y_low, y_high);
                 if n[2] > 0.0 {
-                    to = to.min((above / n[2]).floor());
-                    from = from.max(((above - thickness) / n[2]).ceil());
+                    // With above = q N + r and thickness = w N + s, ceil((above - thickness) / N) is q - w + (r > s).
+                    let top = (above / n[2]).floor();
+                    let carry = (above - top * n[2]).simd_gt(f64x8::splat(simd, thickness_rest));
+                    to = to.min(top);
+                    from = from.max(top - thickness_whole + carry.select(one, zero));
                 } else {
                     // A plane along z lets a column pass or not.
                     set = set & above.simd_ge(zero) & (above - thickness).simd_le(zero);
@@ -166,19 +176,14 @@ pub(super) fn voxelize<V: Simd, R: Rule>(
                     to = box_high;
                 }
                 tile |= (set & from.simd_le(to)).to_bitmask() << (LANES * row);
-                (from + base_z).to_int::<i64x8<V>>().store_slice(&mut starts[LANES * row..LANES * row + LANES]);
-                (to + base_z).to_int::<i64x8<V>>().store_slice(&mut ends[LANES * row..LANES * row + LANES]);
+                (from + to_word).to_int::<i64x8<V>>().store_slice(&mut starts[LANES * row..LANES * row + LANES]);
+                (to + to_word).to_int::<i64x8<V>>().store_slice(&mut ends[LANES * row..LANES * row + LANES]);
                 x += 1.0;
                 row += 1;
             }
             #[expect(clippy::cast_possible_truncation, reason = "indices")]
             let (gx, gy) = (x_start as i64 + base[0], y_start as i64 + base[1]);
-            while tile != 0 {
-                let bit = tile.trailing_zeros();
-                tile &= tile - 1;
-                let at = bit as usize % (LANES * LANES);
-                sink.run(gx + i64::from(bit / 8), gy + i64::from(bit % 8), starts[at], ends[at]);
-            }
+            sink.tile([gx, gy, start_z], tile, starts, ends, last_z);
             x_start += 8.0;
             first_row += LANES;
         }

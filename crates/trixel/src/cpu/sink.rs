@@ -1,5 +1,6 @@
 //! Where the kernel's runs go: bits of a slab of columns.
 
+use super::rows::Tile;
 use super::triangles::LANES;
 use crate::volume::WORD_BITS;
 
@@ -10,6 +11,16 @@ const WORD_SHIFT: u32 = WORD_BITS.trailing_zeros();
 pub(super) trait Sink {
     /// The voxels `(x, y, from..=to)`, all inside the clip that the kernel was given.
     fn run(&mut self, x: i64, y: i64, from: i64, to: i64);
+
+    /// Runs of columns `(x, y)` of eight by eight from `at` on: those whose bit `8 x + y` is set in `columns`. The z of their
+    /// ends are seen from `at`, where a word of each column begins, and are at most `last_z`.
+    #[inline(always)]
+    fn tile(&mut self, at: [i64; 3], columns: u64, from: &Tile, to: &Tile, _last_z: i64) {
+        for_each_column(columns, |column| {
+            let (x, y) = (at[0] + (column / 8) as i64, at[1] + (column % 8) as i64);
+            self.run(x, y, at[2] + from[column], at[2] + to[column]);
+        });
+    }
 
     /// Whether a triangle that is not tiny, of which the number and the range of x inside the clip are given, is left for
     /// later.
@@ -173,6 +184,46 @@ impl Sink for SetRuns<'_> {
             column[first + 1..last].fill(u64::MAX);
             column[last] |= to_bits;
         }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
+    fn tile(&mut self, at: [i64; 3], columns: u64, from: &Tile, to: &Tile, last_z: i64) {
+        let Slab { words, start, columns: row, column_words } = &mut self.0;
+        let [x, y, z] = [0, 1, 2].map(|i| (at[i] - start[i]) as usize);
+        let first = (x * *row + y) * *column_words + z / WORD_BITS as usize;
+        let layer = *row * *column_words;
+        let word = |column: usize| first + column / 8 * layer + column % 8 * *column_words;
+        if last_z < i64::from(WORD_BITS) {
+            for_each_column(columns, |column| {
+                let (from, to) = (from[column] as u32 % WORD_BITS, to[column] as u32 % WORD_BITS);
+                words[word(column)] |= (u64::MAX << from) & (u64::MAX >> (WORD_BITS - 1 - to));
+            });
+        } else if last_z < i64::from(2 * WORD_BITS) {
+            for_each_column(columns, |column| {
+                let (from, to) = (from[column] as u32 % (2 * WORD_BITS), to[column] as u32 % (2 * WORD_BITS));
+                let bits = (u128::MAX << from) & (u128::MAX >> (2 * WORD_BITS - 1 - to));
+                let (word, above) = (word(column), (bits >> WORD_BITS) as u64);
+                words[word] |= bits as u64;
+                if above != 0 {
+                    words[word + 1] |= above;
+                }
+            });
+        } else {
+            for_each_column(columns, |column| {
+                let (x, y) = (at[0] + (column / 8) as i64, at[1] + (column % 8) as i64);
+                self.run(x, y, at[2] + from[column], at[2] + to[column]);
+            });
+        }
+    }
+}
+
+/// Calls `each` with the numbers of the bits set in `columns`.
+#[inline(always)]
+fn for_each_column(mut columns: u64, mut each: impl FnMut(usize)) {
+    while columns != 0 {
+        each(columns.trailing_zeros() as usize % 64);
+        columns &= columns - 1;
     }
 }
 
