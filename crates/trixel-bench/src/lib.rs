@@ -5,7 +5,6 @@
 //! holds the papers' own numbers. Results are plain data for `serde`.
 
 mod cpu_name;
-mod plot;
 mod subjects;
 
 pub mod compare;
@@ -13,6 +12,7 @@ pub mod fills;
 pub mod html;
 pub mod lists;
 pub mod measure;
+pub mod plot;
 pub mod published;
 pub mod results;
 pub mod text;

@@ -5,9 +5,12 @@ use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::prelude::*;
 
 /// One line of a plot.
-pub(crate) struct Line {
-    pub(crate) name: String,
-    pub(crate) points: Vec<(f64, f64)>,
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// What the legend says.
+    pub name: String,
+    /// Where it is across, and milliseconds.
+    pub points: Vec<(f64, f64)>,
 }
 
 /// Colours that people with colour blindness can tell apart (Okabe and Ito 2008).
@@ -27,7 +30,8 @@ const SIZE: (u32, u32) = (720, 420);
 
 /// A plot of times in milliseconds on a logarithmic axis; the horizontal one is logarithmic too if asked for, with a tick at
 /// every value that occurs. `None` when there is nothing to show.
-pub(crate) fn plot(title: &str, across: &str, log_across: bool, lines: &[Line]) -> Option<String> {
+#[must_use]
+pub fn plot(title: &str, across: &str, log_across: bool, lines: &[Line]) -> Option<String> {
     let points = || lines.iter().flat_map(|line| &line.points);
     let (left, right) = low_high(points().map(|point| point.0))?;
     let (bottom, top) = low_high(points().map(|point| point.1.max(1e-3)))?;
