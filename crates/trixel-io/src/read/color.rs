@@ -26,6 +26,14 @@ impl VertexColors {
         self.values.push(rgba.map(narrow));
     }
 
+    /// Adds those of the vertices behind the first `vertices`.
+    pub(super) fn append(&mut self, vertices: usize, more: Self) {
+        if !more.values.is_empty() {
+            self.values.resize(vertices, [f32::NAN; 4]);
+            self.values.extend(more.values);
+        }
+    }
+
     /// Linear colours for `vertices` vertices, white where the file gave none; `None` if it gave none at all.
     pub(super) fn finish(mut self, vertices: usize, scale: Scale) -> Option<Attribute<[f32; 4]>> {
         if self.values.is_empty() {

@@ -25,6 +25,7 @@ mod instances;
 mod mtl;
 mod obj;
 mod off;
+mod pieces;
 mod ply;
 mod ply_header;
 mod polygon;
@@ -36,6 +37,7 @@ mod testing;
 mod text;
 mod threemf;
 mod transform;
+mod vertices;
 
 use std::io::Read;
 use std::path::{Path, PathBuf};

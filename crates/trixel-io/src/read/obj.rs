@@ -6,10 +6,12 @@ use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 
 use memchr::memchr2;
+use rayon::prelude::*;
 use trixel::{Attribute, Mesh};
 
 use super::color::{Scale, VertexColors};
 use super::mtl::{MOST_MATERIALS, Materials};
+use super::pieces::{self, Part, Piece};
 use super::polygon::{Faces, fan};
 use super::text::{self, Scanner, line_at, shown};
 use super::{Loaded, Problem, ReadOptions, Resources, warn_of};
@@ -23,14 +25,77 @@ const NONE: u32 = Attribute::<[f32; 2]>::NONE;
 
 pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resources) -> Result<Loaded, Problem> {
     let bytes = text::without_byte_order_mark(bytes);
-    let mut reader = Reader { attributes: options.attributes, ..Reader::default() };
+    let pieces = pieces::cut(bytes, |at| !continues(bytes, at));
+    let parts = before_pieces(&pieces).into_par_iter().zip(&pieces).map(|(before, piece)| {
+        let mut reader = Reader { attributes: options.attributes, before, ..Reader::default() };
+        let read = for_each_line(piece.bytes, |line, at| {
+            reader.line(line, piece.start + at).map_err(|what| (piece.start + at, what))
+        });
+        read.map(|()| reader)
+    });
+    let mut parts = parts.collect::<Vec<_>>().into_iter();
+    let mut all = Reader { attributes: options.attributes, ..Reader::default() };
+    // The first thing wrong in the file is that of the first piece with any.
+    parts
+        .try_for_each(|part| part.map(|part| all.append(part)))
+        .map_err(|(at, what)| Problem::new(line_at(bytes, at), what))?;
+    all.finish(bytes, resources)
+}
+
+/// Whether the line that starts at byte `at` continues the one before.
+fn continues(bytes: &[u8], at: usize) -> bool {
+    let line = bytes[..at].strip_suffix(b"\n").unwrap_or(&bytes[..at]);
+    line.strip_suffix(b"\r").unwrap_or(line).ends_with(b"\\")
+}
+
+/// Calls `each` with every line and where it starts.
+fn for_each_line<E>(bytes: &[u8], mut each: impl FnMut(&[u8], usize) -> Result<(), E>) -> Result<(), E> {
     let mut at = 0;
     while at < bytes.len() {
         let (line, next) = logical_line(bytes, at);
-        reader.line(&line, at).map_err(|what| Problem::new(line_at(bytes, at), what))?;
+        each(&line, at)?;
         at = next;
     }
-    reader.finish(bytes, resources)
+    Ok(())
+}
+
+/// Lines that the corners of faces count, from the first or backwards from the last.
+#[derive(Clone, Copy, Default)]
+struct Counts {
+    positions: usize,
+    texture_coordinates: usize,
+    normals: usize,
+}
+
+/// What is in front of each piece.
+fn before_pieces(pieces: &[Piece<'_>]) -> Vec<Counts> {
+    let mut before = Counts::default();
+    let in_pieces: Vec<Counts> = match pieces {
+        [_] => vec![before],
+        _ => pieces.par_iter().map(|piece| count(piece.bytes)).collect(),
+    };
+    let sums = in_pieces.into_iter().map(|here| {
+        let sum = before;
+        before.positions += here.positions;
+        before.texture_coordinates += here.texture_coordinates;
+        before.normals += here.normals;
+        sum
+    });
+    sums.collect()
+}
+
+fn count(bytes: &[u8]) -> Counts {
+    let mut counts = Counts::default();
+    let Ok(()) = for_each_line(bytes, |line, _| {
+        match Scanner::with_comments(line).word() {
+            Some(b"v") => counts.positions += 1,
+            Some(b"vt") => counts.texture_coordinates += 1,
+            Some(b"vn") => counts.normals += 1,
+            _ => {}
+        }
+        Ok::<(), std::convert::Infallible>(())
+    });
+    counts
 }
 
 /// The line at `at`, joined with those that it continues on by a `\` at its end, and where the next starts.
@@ -82,6 +147,14 @@ impl Corners {
         fan(&self.face, &mut self.triangles);
     }
 
+    /// Adds those behind the first `triangles`.
+    fn append(&mut self, triangles: usize, more: Self) {
+        if !more.triangles.is_empty() {
+            self.triangles.resize(triangles, [NONE; 3]);
+            self.triangles.extend(more.triangles);
+        }
+    }
+
     /// The attribute that the corners choose values of, and how many chose one that does not exist.
     fn finish<T: Copy>(mut self, triangles: usize, values: Vec<T>) -> (Option<Attribute<T>>, usize) {
         if self.triangles.is_empty() {
@@ -102,6 +175,8 @@ impl Corners {
 #[derive(Default)]
 struct Reader {
     attributes: bool,
+    /// What is in front of the piece that is read; all lists and numbers below start with the piece.
+    before: Counts,
     positions: Vec<[f64; 3]>,
     colors: VertexColors,
     texture_coordinates: Vec<[f32; 2]>,
@@ -111,7 +186,7 @@ struct Reader {
     texture_corners: Corners,
     normal_corners: Corners,
     /// The highest vertex that a face names, and where the line with it starts.
-    highest: (u32, usize),
+    highest: Option<(u32, usize)>,
     /// First triangle of each run of faces with the same material, and its number in `used`.
     material_runs: Vec<(usize, u32)>,
     used: Vec<Vec<u8>>,
@@ -122,6 +197,31 @@ struct Reader {
     free_forms: usize,
     /// Number and first place of lines that are not OBJ.
     unknown: (usize, usize),
+}
+
+impl Part for Reader {
+    fn append(&mut self, more: Self) {
+        let (vertices, triangles) = (self.positions.len(), self.faces.triangles.len());
+        self.colors.append(vertices, more.colors);
+        self.positions.extend(more.positions);
+        self.texture_coordinates.extend(more.texture_coordinates);
+        self.normals.extend(more.normals);
+        self.texture_corners.append(triangles, more.texture_corners);
+        self.normal_corners.append(triangles, more.normal_corners);
+        self.faces.append(more.faces, 0);
+        self.highest = match (self.highest, more.highest) {
+            (Some(here), Some(behind)) if behind.0 < here.0 => Some(here),
+            (here, behind) => behind.or(here),
+        };
+        let numbers: Vec<u32> = more.used.iter().map(|name| self.number_of(name, MOST_MATERIALS)).collect();
+        let runs = more.material_runs.iter().map(|&(first, used)| (triangles + first, numbers[used as usize]));
+        self.material_runs.extend(runs);
+        self.libraries.extend(more.libraries);
+        self.weighted += more.weighted;
+        self.free_forms += more.free_forms;
+        let first = if self.unknown.0 > 0 { self.unknown.1 } else { more.unknown.1 };
+        self.unknown = (self.unknown.0 + more.unknown.0, first);
+    }
 }
 
 impl Reader {
@@ -181,12 +281,13 @@ impl Reader {
         self.normal_corners.face.clear();
         while scanner.skip_space().is_some() {
             let mut corner = References { rest: scanner.rest() };
-            let parsed = corner.next(self.positions.len()).and_then(|vertex| {
+            let parsed = corner.next(self.before.positions + self.positions.len()).and_then(|vertex| {
                 if !self.attributes {
                     return Some([vertex, NONE, NONE]);
                 }
-                let texture = corner.next_after_slash(self.texture_coordinates.len())?;
-                let normal = corner.next_after_slash(self.normals.len())?;
+                let texture =
+                    corner.next_after_slash(self.before.texture_coordinates + self.texture_coordinates.len())?;
+                let normal = corner.next_after_slash(self.before.normals + self.normals.len())?;
                 corner.rest.first().is_none_or(|&b| b <= b' ').then_some([vertex, texture, normal])
             });
             let word = scanner.word();
@@ -197,8 +298,8 @@ impl Reader {
                      counted from 1, or from -1 backwards and not before the first"
                 ));
             };
-            if vertex >= self.highest.0 {
-                self.highest = (vertex, at);
+            if self.highest.is_none_or(|(highest, _)| vertex >= highest) {
+                self.highest = Some((vertex, at));
             }
             self.vertices.push(vertex);
             if self.attributes {
@@ -214,25 +315,32 @@ impl Reader {
     }
 
     fn use_material(&mut self, name: &[u8]) {
-        let index = match self.used_by_name.get(name) {
-            Some(&index) => index,
-            None if self.used.len() >= MOST_MATERIALS => Mesh::NO_MATERIAL,
-            None => {
-                let index = u32::try_from(self.used.len()).unwrap_or(Mesh::NO_MATERIAL);
-                self.used.push(name.to_vec());
-                self.used_by_name.insert(name.to_vec(), index);
-                index
-            }
-        };
+        let index = self.number_of(name, usize::MAX);
         self.material_runs.push((self.faces.triangles.len(), index));
+    }
+
+    /// The number in `used` of a material, of at most so many.
+    fn number_of(&mut self, name: &[u8], most: usize) -> u32 {
+        if let Some(&index) = self.used_by_name.get(name) {
+            return index;
+        }
+        if self.used.len() >= most {
+            return Mesh::NO_MATERIAL;
+        }
+        let index = u32::try_from(self.used.len()).unwrap_or(Mesh::NO_MATERIAL);
+        self.used.push(name.to_vec());
+        self.used_by_name.insert(name.to_vec(), index);
+        index
     }
 
     fn finish(mut self, bytes: &[u8], resources: &dyn Resources) -> Result<Loaded, Problem> {
         let vertices = self.positions.len();
-        if self.highest.0 as usize >= vertices && !self.faces.triangles.is_empty() {
-            let what =
-                format!("the face names vertex {}, but the file has only {vertices}", u64::from(self.highest.0) + 1);
-            return Err(Problem::new(line_at(bytes, self.highest.1), what));
+        if let Some((highest, at)) = self.highest
+            && highest as usize >= vertices
+            && !self.faces.triangles.is_empty()
+        {
+            let what = format!("the face names vertex {}, but the file has only {vertices}", u64::from(highest) + 1);
+            return Err(Problem::new(line_at(bytes, at), what));
         }
         let mut warnings = Vec::new();
         self.warn_of_lines(bytes, &mut warnings);

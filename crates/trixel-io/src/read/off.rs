@@ -3,11 +3,13 @@
 //! One vertex and one face a line, as every writer does. Colours of faces are not read: [`trixel::Mesh`] has none.
 //! Own code because the crates for OFF read coordinates as `f32`.
 
-use trixel::{Attribute, Mesh};
+use trixel::Mesh;
 
-use super::color::{Scale, VertexColors};
+use super::color::Scale;
+use super::pieces::{self, Part};
 use super::polygon::Faces;
 use super::text::{self, Scanner};
+use super::vertices::Vertices;
 use super::{Loaded, Problem, ReadOptions, Resources};
 use crate::numbers::narrow;
 
@@ -103,63 +105,76 @@ fn read_vertices(
 ) -> Result<Mesh, Problem> {
     // Three digits, two spaces and a line end are the least that a vertex takes.
     let capacity = usize::try_from(count).unwrap_or(usize::MAX).min(scanner.rest().len() / 6);
-    let mut positions = Vec::with_capacity(capacity);
-    let (mut normals, mut uvs, mut colors) = (Vec::new(), Vec::new(), VertexColors::default());
-    for vertex in 0..count {
+    let mut vertices = Vertices::with_capacity(capacity);
+    pieces::rows(scanner, count, &mut vertices, |scanner, vertices, vertex| {
         let mut position = [0.0; 3];
         for coordinate in &mut position {
             *coordinate = scanner
                 .float()
                 .ok_or_else(|| scanner.unexpected(&format!("a coordinate of vertex {vertex} of {count}")))?;
         }
-        positions.push(position);
+        vertices.positions.push(position);
         if options.attributes {
-            let mut numbers =
-                |into: &mut [f64]| into.iter_mut().map_while(|x| scanner.float_on_line().map(|f| *x = f)).count();
-            if header.normal {
-                let mut normal = [0.0; 3];
-                numbers(&mut normal);
-                normals.push(normal.map(narrow));
-            }
-            if header.color || header.texture {
-                // Colours have three or four numbers; the texture coordinates are the last two of the line.
-                let mut rest = [f64::NAN; 6];
-                let found = numbers(&mut rest);
-                let color = if header.texture { found.saturating_sub(2) } else { found };
-                if header.color {
-                    let mut rgba = [f64::NAN; 4];
-                    rgba[..color.min(4)].copy_from_slice(&rest[..color.min(4)]);
-                    colors.set(positions.len() - 1, rgba);
-                }
-                if header.texture {
-                    let uv = if found >= 2 { [rest[color], 1.0 - rest[color + 1]] } else { [0.0; 2] };
-                    uvs.push(uv.map(narrow));
-                }
-            }
+            read_attributes(scanner, header, vertices);
         }
         scanner.skip_line();
+        Ok(())
+    })?;
+    Ok(vertices.finish(Scale::Guess))
+}
+
+/// What follows the position of the last vertex.
+fn read_attributes(scanner: &mut Scanner<'_>, header: Header, vertices: &mut Vertices) {
+    let mut numbers = |into: &mut [f64]| into.iter_mut().map_while(|x| scanner.float_on_line().map(|f| *x = f)).count();
+    if header.normal {
+        let mut normal = [0.0; 3];
+        numbers(&mut normal);
+        vertices.normals.push(normal.map(narrow));
     }
-    let mut mesh = Mesh::new(positions, Vec::new());
-    mesh.colors = colors.finish(mesh.positions.len(), Scale::Guess);
-    mesh.normals = (!normals.is_empty()).then(|| Attribute::per_vertex(normals));
-    mesh.uvs = if uvs.is_empty() { Vec::new() } else { vec![Attribute::per_vertex(uvs)] };
-    Ok(mesh)
+    if header.color || header.texture {
+        // Colours have three or four numbers; the texture coordinates are the last two of the line.
+        let mut rest = [f64::NAN; 6];
+        let found = numbers(&mut rest);
+        let color = if header.texture { found.saturating_sub(2) } else { found };
+        if header.color {
+            let mut rgba = [f64::NAN; 4];
+            rgba[..color.min(4)].copy_from_slice(&rest[..color.min(4)]);
+            vertices.colors.set(vertices.positions.len() - 1, rgba);
+        }
+        if header.texture {
+            let uv = if found >= 2 { [rest[color], 1.0 - rest[color + 1]] } else { [0.0; 2] };
+            vertices.uvs.push(uv.map(narrow));
+        }
+    }
+}
+
+/// Faces as they are read.
+#[derive(Default)]
+struct FaceRows {
+    faces: Faces,
+    /// Of the face being read.
+    corners: Vec<u32>,
+}
+
+impl Part for FaceRows {
+    fn append(&mut self, more: Self) {
+        self.faces.append(more.faces, 0);
+    }
 }
 
 fn read_faces(scanner: &mut Scanner<'_>, count: u64, vertices: usize) -> Result<Faces, Problem> {
-    let mut faces = Faces::default();
+    let mut all = FaceRows::default();
     // "3 0 1 2" and a line end.
-    faces.triangles.reserve(usize::try_from(count).unwrap_or(usize::MAX).min(scanner.rest().len() / 8));
-    let mut corners = Vec::new();
-    for face in 0..count {
+    all.faces.triangles.reserve(usize::try_from(count).unwrap_or(usize::MAX).min(scanner.rest().len() / 8));
+    pieces::rows(scanner, count, &mut all, |scanner, rows, face| {
         let size = scanner
             .count()
             .ok_or_else(|| scanner.unexpected(&format!("the number of corners of face {face} of {count}")))?;
-        corners.clear();
+        rows.corners.clear();
         for _ in 0..size {
             let vertex = scanner.count().ok_or_else(|| scanner.unexpected(&format!("a vertex of face {face}")))?;
             match u32::try_from(vertex) {
-                Ok(index) if (index as usize) < vertices => corners.push(index),
+                Ok(index) if (index as usize) < vertices => rows.corners.push(index),
                 _ => {
                     let what =
                         format!("face {face} names vertex {vertex}, but the file has {vertices}, counted from 0");
@@ -167,8 +182,9 @@ fn read_faces(scanner: &mut Scanner<'_>, count: u64, vertices: usize) -> Result<
                 }
             }
         }
-        faces.push(&corners);
+        rows.faces.push(&rows.corners);
         scanner.skip_line();
-    }
-    Ok(faces)
+        Ok(())
+    })?;
+    Ok(all.faces)
 }

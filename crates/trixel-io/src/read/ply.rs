@@ -5,10 +5,12 @@
 
 use trixel::{Attribute, Image, ImageSource, Material, Mesh, Texture, TextureRef};
 
-use super::color::{Scale, VertexColors};
+use super::color::Scale;
+use super::pieces::{self, Part, Text};
 use super::ply_header::{Element, Encoding, Header, Kind, Property, Scalar};
-use super::polygon::{Faces, fan};
+use super::polygon::Faces;
 use super::text::{self, Scanner, shown};
+use super::vertices::Vertices;
 use super::{Loaded, Problem, ReadOptions, Resources, warn_of};
 use crate::numbers::narrow;
 
@@ -31,7 +33,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, resources: &dyn Resource
 }
 
 /// The numbers behind the header, in whichever encoding.
-trait Source {
+trait Source: Sized {
     /// The next number; `None` when there is none or it is none.
     fn number(&mut self, scalar: Scalar) -> Option<f64>;
 
@@ -44,9 +46,17 @@ trait Source {
     /// The most rows that can still follow, when each takes at least `smallest_row` bytes in binary.
     fn most_rows(&self, smallest_row: usize, properties: usize) -> usize;
 
+    /// Reads `count` rows into `all` with `row`, which is told the number of each and moves over at least one number.
+    fn rows<T: Part>(
+        &mut self,
+        count: u64,
+        all: &mut T,
+        row: impl Fn(&mut Self, &mut T, u64) -> Result<(), Problem> + Sync,
+    ) -> Result<(), Problem>;
+
     /// Moves over rows for as long as they are triangles (`rows.offset` bytes into each, a count of 3 and 32-bit indices)
-    /// and appends those, where the encoding lets it do so quickly; returns how many.
-    fn triangles(&mut self, rows: Rows, out: &mut Vec<[u32; 3]>) -> u64;
+    /// and appends those; returns how many. `None` where the encoding has no such rows.
+    fn triangles(&mut self, rows: Rows, out: &mut Vec<[u32; 3]>) -> Option<u64>;
 
     /// Moves over all rows and appends the three `f32` that each holds, where the encoding lets it do so quickly;
     /// otherwise returns `false` and moves nowhere.
@@ -88,12 +98,31 @@ impl Source for Words<'_> {
         self.scanner.rest().len() / (2 * properties).max(1)
     }
 
-    fn triangles(&mut self, _rows: Rows, _out: &mut Vec<[u32; 3]>) -> u64 {
-        0
+    fn rows<T: Part>(
+        &mut self,
+        count: u64,
+        all: &mut T,
+        row: impl Fn(&mut Self, &mut T, u64) -> Result<(), Problem> + Sync,
+    ) -> Result<(), Problem> {
+        pieces::rows(self, count, all, row)
+    }
+
+    fn triangles(&mut self, _rows: Rows, _out: &mut Vec<[u32; 3]>) -> Option<u64> {
+        None
     }
 
     fn float_triples(&mut self, _rows: Rows, _out: &mut Vec<[f64; 3]>) -> bool {
         false
+    }
+}
+
+impl<'a> Text<'a> for Words<'a> {
+    fn scanner(&mut self) -> &mut Scanner<'a> {
+        &mut self.scanner
+    }
+
+    fn of(&self, piece: &'a [u8]) -> Self {
+        Self { scanner: self.scanner.like(piece), ..*self }
     }
 }
 
@@ -149,7 +178,16 @@ impl<const BIG: bool> Source for Binary<'_, BIG> {
         (self.data.len() - self.at) / smallest_row.max(1)
     }
 
-    fn triangles(&mut self, rows: Rows, out: &mut Vec<[u32; 3]>) -> u64 {
+    fn rows<T: Part>(
+        &mut self,
+        count: u64,
+        all: &mut T,
+        row: impl Fn(&mut Self, &mut T, u64) -> Result<(), Problem> + Sync,
+    ) -> Result<(), Problem> {
+        (0..count).try_for_each(|number| row(self, all, number))
+    }
+
+    fn triangles(&mut self, rows: Rows, out: &mut Vec<[u32; 3]>) -> Option<u64> {
         let data = self.data.get(self.at..).unwrap_or_default();
         let most = usize::try_from(rows.count).unwrap_or(usize::MAX);
         let before = out.len();
@@ -159,7 +197,7 @@ impl<const BIG: bool> Source for Binary<'_, BIG> {
         }
         let read = out.len() - before;
         self.at += read * rows.stride;
-        read as u64
+        Some(read as u64)
     }
 
     fn float_triples(&mut self, rows: Rows, out: &mut Vec<[f64; 3]>) -> bool {
@@ -271,18 +309,14 @@ fn read_vertices<S: Source>(source: &mut S, element: &Element<'_>, options: &Rea
     let has = |mut range: std::ops::Range<usize>| range.all(|slot| kind_of(slot).is_some());
     let (has_normals, has_uvs, has_colors) = (has(3..6), has(6..8), has(8..11));
 
-    let capacity = capacity(source, element);
-    let mut positions = Vec::with_capacity(capacity);
-    let mut normals = Vec::with_capacity(if has_normals { capacity } else { 0 });
-    let mut uvs = Vec::with_capacity(if has_uvs { capacity } else { 0 });
-    let mut colors = VertexColors::default();
+    let mut vertices = Vertices::with_capacity(capacity(source, element));
     if let Some(rows) = float_positions(element, &slots)
-        && source.float_triples(rows, &mut positions)
+        && source.float_triples(rows, &mut vertices.positions)
     {
-        return Ok(Mesh::new(positions, Vec::new()));
+        return Ok(Mesh::new(vertices.positions, Vec::new()));
     }
-    let mut row = [f64::NAN; SLOTS];
-    for vertex in 0..element.count {
+    source.rows(element.count, &mut vertices, |source, vertices, vertex| {
+        let mut row = [f64::NAN; SLOTS];
         for (property, slot) in element.properties.iter().zip(&slots) {
             let found = match *slot {
                 Some((slot, scalar)) => source.number(scalar).map(|number| row[slot] = number),
@@ -294,26 +328,23 @@ fn read_vertices<S: Source>(source: &mut S, element: &Element<'_>, options: &Rea
             }
         }
         if has_colors {
-            colors.set(positions.len(), [row[8], row[9], row[10], row[11]]);
+            vertices.colors.set(vertices.positions.len(), [row[8], row[9], row[10], row[11]]);
         }
         if has_normals {
-            normals.push([row[3], row[4], row[5]].map(narrow));
+            vertices.normals.push([row[3], row[4], row[5]].map(narrow));
         }
         if has_uvs {
-            uvs.push([row[6], 1.0 - row[7]].map(narrow));
+            vertices.uvs.push([row[6], 1.0 - row[7]].map(narrow));
         }
-        positions.push([row[0], row[1], row[2]]);
-    }
+        vertices.positions.push([row[0], row[1], row[2]]);
+        Ok(())
+    })?;
     let scale = match kind_of(8) {
         None | Some(Scalar::F32 | Scalar::F64) => Scale::Guess,
         Some(Scalar::U16) => Scale::Of(65_535.0),
         Some(_) => Scale::Of(255.0),
     };
-    let mut mesh = Mesh::new(positions, Vec::new());
-    mesh.colors = colors.finish(mesh.positions.len(), scale);
-    mesh.normals = has_normals.then(|| Attribute::per_vertex(normals));
-    mesh.uvs = if has_uvs { vec![Attribute::per_vertex(uvs)] } else { Vec::new() };
-    Ok(mesh)
+    Ok(vertices.finish(scale))
 }
 
 /// The rows of vertices of which only the position is wanted and is three `f32` in a row, as in most large files.
@@ -363,6 +394,55 @@ struct FaceData {
     uv_corners: Vec<[u32; 3]>,
     /// First triangle and texture of each run of faces with the same texture.
     texture_runs: Vec<(usize, Option<u32>)>,
+    /// Of the face being read: its vertices, and the numbers of its texture coordinates.
+    corners: Vec<u32>,
+    corner_uvs: Vec<f64>,
+}
+
+impl FaceData {
+    /// Starts a run of faces with a texture, or goes on with one.
+    fn set_texture(&mut self, texture: Option<u32>) {
+        if self.texture_runs.last().is_none_or(|&(_, last)| last != texture) {
+            self.texture_runs.push((self.faces.triangles.len(), texture));
+        }
+    }
+
+    /// Adds the face that was read.
+    fn push(&mut self) {
+        let (before, corners) = (self.faces.triangles.len(), self.corners.len());
+        self.faces.push(&self.corners);
+        // A list of another length than two a corner says nothing.
+        if !self.corner_uvs.is_empty() && self.corner_uvs.len() == 2 * corners && corners > 2 {
+            let first = self.uvs.len();
+            self.uvs.extend(self.corner_uvs.chunks_exact(2).map(|uv| [uv[0], 1.0 - uv[1]].map(narrow)));
+            self.uv_corners.resize(before, [Attribute::<[f32; 2]>::NONE; 3]);
+            // The fan, as for the vertices.
+            self.uv_corners.extend((2..corners).map(|i| [first, first + i - 1, first + i].map(uv_index)));
+        }
+    }
+}
+
+impl Part for FaceData {
+    fn append(&mut self, more: Self) {
+        let (triangles, uvs) = (self.faces.triangles.len(), self.uvs.len());
+        for (first, texture) in more.texture_runs {
+            if self.texture_runs.last().is_none_or(|&(_, last)| last != texture) {
+                self.texture_runs.push((triangles + first, texture));
+            }
+        }
+        if !more.uvs.is_empty() {
+            let none = Attribute::<[f32; 2]>::NONE;
+            let behind = |index: u32| if index == none { none } else { uv_index(uvs + index as usize) };
+            self.uv_corners.resize(triangles, [none; 3]);
+            self.uv_corners.extend(more.uv_corners.into_iter().map(|triangle| triangle.map(behind)));
+            self.uvs.extend(more.uvs);
+        }
+        self.faces.append(more.faces, 0);
+    }
+}
+
+fn uv_index(index: usize) -> u32 {
+    u32::try_from(index).unwrap_or(Attribute::<[f32; 2]>::NONE)
 }
 
 /// What a face property is.
@@ -394,67 +474,65 @@ fn read_faces<S: Source>(
         return skip_element(source, element);
     }
     data.faces.triangles.reserve(capacity(source, element));
-    let (mut corners, mut uvs): (Vec<u32>, Vec<f64>) = (Vec::new(), Vec::new());
-    let mut uv_indices = Vec::new();
-    let plain = plain_triangles(element, &slots);
-    if plain.is_some() {
-        data.texture_runs.push((data.faces.triangles.len(), None));
-    }
+    let row = |source: &mut S, data: &mut FaceData, face| read_face(source, element, &slots, data, face);
     let mut face = 0;
-    while face < element.count {
-        if let Some(rows) = plain {
-            let left = Rows { count: element.count - face, ..rows };
-            let read = source.triangles(left, &mut data.faces.triangles);
-            if read > 0 {
-                face += read;
-                continue;
-            }
-        }
-        let mut texture = None;
-        uvs.clear();
-        for (property, slot) in element.properties.iter().zip(&slots) {
-            let found = match *slot {
-                FaceSlot::Vertices { count, item } => {
-                    corners.clear();
-                    let mut wrong = None;
-                    let found = list(source, count, item, |number| match vertex_index(number) {
-                        Some(index) => corners.push(index),
-                        None => wrong = Some(number),
-                    });
-                    if let Some(number) = wrong {
-                        let what = format!("{number} is not the number of a vertex");
-                        return Err(Problem::new(format!("face {face}"), what));
-                    }
-                    found
+    if let Some(plain) = plain_triangles(element, &slots) {
+        data.set_texture(None);
+        while face < element.count {
+            let left = Rows { count: element.count - face, ..plain };
+            match source.triangles(left, &mut data.faces.triangles) {
+                None => break,
+                Some(0) => {
+                    row(source, data, face)?;
+                    face += 1;
                 }
-                FaceSlot::TextureCoordinates { count, item } => list(source, count, item, |number| uvs.push(number)),
-                FaceSlot::TextureNumber(scalar) => source.number(scalar).map(|number| texture = vertex_index(number)),
-                FaceSlot::Other => skip_property(source, property),
-            };
-            if found.is_none() {
-                let what = format!("`{}` of face {face} of {}", shown(property.name), element.count);
-                return Err(source.problem(&what));
+                Some(read) => face += read,
             }
         }
-        if data.texture_runs.last().is_none_or(|&(_, last)| last != texture) {
-            data.texture_runs.push((data.faces.triangles.len(), texture));
-        }
-        data.faces.push(&corners);
-        // A list of another length than two a corner says nothing.
-        if !uvs.is_empty() && uvs.len() == 2 * corners.len() && corners.len() > 2 {
-            uv_indices.clear();
-            for uv in uvs.chunks_exact(2) {
-                uv_indices.push(u32::try_from(data.uvs.len()).unwrap_or(Attribute::<[f32; 2]>::NONE));
-                data.uvs.push([uv[0], 1.0 - uv[1]].map(narrow));
-            }
-            let before = data.faces.triangles.len() - (corners.len() - 2);
-            data.uv_corners.resize(before, [Attribute::<[f32; 2]>::NONE; 3]);
-            fan(&uv_indices, &mut data.uv_corners);
-        }
-        face += 1;
     }
-    data.uv_corners
-        .resize(if data.uvs.is_empty() { 0 } else { data.faces.triangles.len() }, [Attribute::<[f32; 2]>::NONE; 3]);
+    source.rows(element.count - face, data, row)?;
+    let textured = if data.uvs.is_empty() { 0 } else { data.faces.triangles.len() };
+    data.uv_corners.resize(textured, [Attribute::<[f32; 2]>::NONE; 3]);
+    Ok(())
+}
+
+fn read_face<S: Source>(
+    source: &mut S,
+    element: &Element<'_>,
+    slots: &[FaceSlot],
+    data: &mut FaceData,
+    face: u64,
+) -> Result<(), Problem> {
+    let mut texture = None;
+    data.corner_uvs.clear();
+    for (property, slot) in element.properties.iter().zip(slots) {
+        let found = match *slot {
+            FaceSlot::Vertices { count, item } => {
+                data.corners.clear();
+                let mut wrong = None;
+                let found = list(source, count, item, |number| match vertex_index(number) {
+                    Some(index) => data.corners.push(index),
+                    None => wrong = Some(number),
+                });
+                if let Some(number) = wrong {
+                    let what = format!("{number} is not the number of a vertex");
+                    return Err(Problem::new(format!("face {face}"), what));
+                }
+                found
+            }
+            FaceSlot::TextureCoordinates { count, item } => {
+                list(source, count, item, |number| data.corner_uvs.push(number))
+            }
+            FaceSlot::TextureNumber(scalar) => source.number(scalar).map(|number| texture = vertex_index(number)),
+            FaceSlot::Other => skip_property(source, property),
+        };
+        if found.is_none() {
+            let what = format!("`{}` of face {face} of {}", shown(property.name), element.count);
+            return Err(source.problem(&what));
+        }
+    }
+    data.set_texture(texture);
+    data.push();
     Ok(())
 }
 

@@ -51,6 +51,14 @@ impl Faces {
         corners.len().saturating_sub(2)
     }
 
+    /// Adds those of a later part of the file, whose vertices are counted from `first_vertex` of this one's.
+    pub(super) fn append(&mut self, more: Self, first_vertex: u32) {
+        let first = self.triangles.len();
+        self.triangles.extend(more.triangles.into_iter().map(|triangle| triangle.map(|vertex| vertex + first_vertex)));
+        self.fans.extend(more.fans.into_iter().map(|(at, count)| (first + at, count)));
+        self.skipped += more.skipped;
+    }
+
     /// Triangulates the concave polygons anew, with `attributes` (corner indices beside the triangles, each empty or as
     /// long), and warns of what was skipped.
     pub(super) fn finish(

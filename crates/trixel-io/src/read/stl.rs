@@ -4,8 +4,10 @@
 //! the corners do. Own code because crates for STL keep `f32` where ASCII files hold more digits, and take any file that
 //! starts with `solid` for ASCII.
 
+use rayon::prelude::*;
 use trixel::Mesh;
 
+use super::pieces::{self, Part};
 use super::polygon::Faces;
 use super::text::{self, Scanner};
 use super::{Loaded, Problem, ReadOptions, Resources};
@@ -93,58 +95,106 @@ pub(super) fn binary_triangles(head: &[u8], length: u64) -> Option<u64> {
 }
 
 fn read_ascii(bytes: &[u8]) -> Result<Loaded, Problem> {
-    let mut scanner = Scanner::new(text::without_byte_order_mark(bytes));
-    let mut positions: Vec<[f64; 3]> = Vec::new();
-    let mut faces = Faces::default();
-    // The vertices of the facet being read start here.
-    let mut facet: Option<usize> = None;
-    let mut corners = Vec::new();
-    let (mut open, mut unknown) = (false, 0u64);
-    while let Some(word) = scanner.word() {
-        let is = |keyword: &str| word.eq_ignore_ascii_case(keyword.as_bytes());
-        if is("vertex") {
-            let mut position = [0.0; 3];
-            for coordinate in &mut position {
-                *coordinate = scanner.float().ok_or_else(|| scanner.unexpected("a coordinate"))?;
-            }
-            facet.get_or_insert(positions.len());
-            positions.push(position);
-        } else if is("facet") {
-            if facet.is_some() {
-                return Err(scanner.problem("this facet starts before the last one ends with `endfacet`"));
-            }
-        } else if is("normal") {
-            // Words, not numbers: some exporters write `-nan(ind)` for a triangle without an area.
-            (0..3).for_each(|_| _ = scanner.word_on_line());
-        } else if is("endfacet") {
-            let first = facet.take().unwrap_or(positions.len());
-            corners.clear();
-            for vertex in first..positions.len() {
-                let index =
-                    u32::try_from(vertex).map_err(|_| scanner.problem("more than 2^32 vertices: split the file"))?;
-                corners.push(index);
-            }
-            faces.push(&corners);
-        } else if is("solid") {
-            scanner.skip_line();
-            open = true;
-        } else if is("endsolid") {
-            scanner.skip_line();
-            open = false;
-        } else if !(is("outer") || is("loop") || is("endloop")) {
-            unknown += 1;
-        }
-    }
-    if facet.is_some() {
-        return Err(scanner.problem("the file ends inside a facet; it is truncated"));
-    }
+    let bytes = text::without_byte_order_mark(bytes);
+    let read = match read_pieces(bytes) {
+        Some(read) => read,
+        None => Ascii::read(bytes)?,
+    };
     let mut warnings = Vec::new();
-    if open {
+    if read.open == Some(true) {
         warnings.push("there is no `endsolid` at the end; the file may be truncated".into());
     }
-    if unknown > 0 {
-        warnings.push(format!("ignored {unknown} words that are not of the STL format"));
+    if read.unknown > 0 {
+        warnings.push(format!("ignored {} words that are not of the STL format", read.unknown));
     }
-    let triangles = faces.finish(&positions, &mut [], &mut warnings);
-    Ok(Loaded { mesh: Mesh::new(positions, triangles), warnings })
+    let triangles = read.faces.finish(&read.positions, &mut [], &mut warnings);
+    Ok(Loaded { mesh: Mesh::new(read.positions, triangles), warnings })
+}
+
+/// The whole in pieces that start with a facet each; `None` if one thread would read anything else.
+fn read_pieces(bytes: &[u8]) -> Option<Ascii> {
+    let facet = |at: usize| {
+        let line = bytes[at..].trim_ascii_start();
+        line.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"facet"))
+    };
+    let pieces = pieces::cut(bytes, facet);
+    if pieces.len() == 1 {
+        return None;
+    }
+    let parts: Vec<Ascii> = pieces.par_iter().map(|piece| Ascii::read(piece.bytes).ok()).collect::<Option<_>>()?;
+    u32::try_from(parts.iter().map(|part| part.positions.len()).sum::<usize>()).ok()?;
+    let mut all = Ascii::default();
+    parts.into_iter().for_each(|part| all.append(part));
+    Some(all)
+}
+
+/// What is read from an ASCII file, or from a piece of whole facets.
+#[derive(Default)]
+struct Ascii {
+    positions: Vec<[f64; 3]>,
+    faces: Faces,
+    /// Whether it ends inside a solid, if one starts or ends in it.
+    open: Option<bool>,
+    /// Words that are none of the format's.
+    unknown: u64,
+}
+
+impl Part for Ascii {
+    fn append(&mut self, more: Self) {
+        // There are fewer than 2^32 vertices in all.
+        let first = u32::try_from(self.positions.len()).unwrap_or(u32::MAX);
+        self.faces.append(more.faces, first);
+        self.positions.extend(more.positions);
+        self.open = more.open.or(self.open);
+        self.unknown += more.unknown;
+    }
+}
+
+impl Ascii {
+    fn read(bytes: &[u8]) -> Result<Self, Problem> {
+        let mut scanner = Scanner::new(bytes);
+        let mut read = Self::default();
+        // The vertices of the facet being read start here.
+        let mut facet: Option<usize> = None;
+        let mut corners = Vec::new();
+        while let Some(word) = scanner.word() {
+            let is = |keyword: &str| word.eq_ignore_ascii_case(keyword.as_bytes());
+            if is("vertex") {
+                let mut position = [0.0; 3];
+                for coordinate in &mut position {
+                    *coordinate = scanner.float().ok_or_else(|| scanner.unexpected("a coordinate"))?;
+                }
+                facet.get_or_insert(read.positions.len());
+                read.positions.push(position);
+            } else if is("facet") {
+                if facet.is_some() {
+                    return Err(scanner.problem("this facet starts before the last one ends with `endfacet`"));
+                }
+            } else if is("normal") {
+                // Words, not numbers: some exporters write `-nan(ind)` for a triangle without an area.
+                (0..3).for_each(|_| _ = scanner.word_on_line());
+            } else if is("endfacet") {
+                let first = facet.take().unwrap_or(read.positions.len());
+                corners.clear();
+                for vertex in first..read.positions.len() {
+                    let index = u32::try_from(vertex)
+                        .map_err(|_| scanner.problem("more than 2^32 vertices: split the file"))?;
+                    corners.push(index);
+                }
+                read.faces.push(&corners);
+            } else if is("solid") {
+                scanner.skip_line();
+                read.open = Some(true);
+            } else if is("endsolid") {
+                scanner.skip_line();
+                read.open = Some(false);
+            } else if !(is("outer") || is("loop") || is("endloop")) {
+                read.unknown += 1;
+            }
+        }
+        if facet.is_some() {
+            return Err(scanner.problem("the file ends inside a facet; it is truncated"));
+        }
+        Ok(read)
+    }
 }

@@ -118,8 +118,13 @@ pub(super) fn assault(bytes: &[u8], rounds: u64, reader: Reader, resources: &dyn
             }
         }
     };
+    for_each_damage(bytes, rounds, attempt);
+}
+
+/// Calls `each` with `bytes` cut off at every length, and in `rounds` damaged forms.
+pub(super) fn for_each_damage(bytes: &[u8], rounds: u64, each: impl Fn(&[u8])) {
     for length in 0..bytes.len() {
-        attempt(&bytes[..length]);
+        each(&bytes[..length]);
     }
     let mut random = Random(1);
     for _ in 0..rounds {
@@ -127,7 +132,7 @@ pub(super) fn assault(bytes: &[u8], rounds: u64, reader: Reader, resources: &dyn
         for _ in 0..=random.below(4) {
             damage(&mut damaged, &mut random);
         }
-        attempt(&damaged);
+        each(&damaged);
     }
 }
 

@@ -33,6 +33,11 @@ impl<'a> Scanner<'a> {
         Self { bytes, at: 0, comments: true }
     }
 
+    /// One for another text, with or without comments as this one.
+    pub(super) fn like<'b>(&self, bytes: &'b [u8]) -> Scanner<'b> {
+        Scanner { bytes, at: 0, comments: self.comments }
+    }
+
     /// Where the scanner is, in bytes from the start.
     pub(super) fn offset(&self) -> usize {
         self.at
@@ -40,6 +45,11 @@ impl<'a> Scanner<'a> {
 
     pub(super) fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.at..).unwrap_or_default()
+    }
+
+    /// Moves over `length` bytes.
+    pub(super) fn skip(&mut self, length: usize) {
+        self.at = self.bytes.len().min(self.at.saturating_add(length));
     }
 
     /// Moves to the next word, over line ends and comments; the word's first byte, or `None` at the end.

@@ -66,6 +66,9 @@ struct Scratch {
     large: large::Scratch,
 }
 
+/// Lanes from which on it pays to look for triangles strictly inside a voxel or a row of two.
+const WORTH_BOXES: u32 = 4;
+
 /// Sends the voxels of a surface mode inside `clip` to `sink`.
 #[inline(always)]
 pub(super) fn surface<V: Simd, R: SurfaceRule>(
@@ -95,6 +98,18 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
             let at_most = |voxels: i32| longest.simd_le(voxels - 1).to_bitmask();
             let inside = near.holds_z(&low, &high) & meets;
             let mut tiny = at_most(4) & inside;
+            let mut settled = 0;
+            if R::TOUCH_IS_ENOUGH {
+                let boxed = (extent[0] + extent[1] + extent[2]).simd_le(1).to_bitmask() & tiny;
+                if boxed.count_ones() >= WORTH_BOXES {
+                    settled = boxed & near.holds_xy(&low, &high);
+                    tiny &= !settled;
+                    simd.vectorize(
+                        #[inline(always)]
+                        || tiny::send_boxes(&low, &extent, settled, &near, sink),
+                    );
+                }
+            }
             let two = at_most(2) & tiny;
             if two != 0 && waiting.twos.push(simd, &corners, two) {
                 simd.vectorize(
@@ -131,7 +146,7 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
                     );
                 }
             }
-            for lane in set_bits(meets & !two & !tiny) {
+            for lane in set_bits(meets & !settled & !two & !tiny) {
                 not_tiny(simd, rule, triangles, at + lane, clip, sink, &mut scratch);
             }
         },
@@ -248,6 +263,13 @@ impl<V: Simd> NearClip<V> {
             meets = meets & low[i].simd_le(self.high[i]) & high[i].simd_ge(self.low[i]);
         }
         meets.to_bitmask()
+    }
+
+    /// The lanes whose boxes are inside the clip along x and y.
+    #[inline(always)]
+    fn holds_xy(&self, low: &[i32x16<V>; 3], high: &[i32x16<V>; 3]) -> u64 {
+        let x = low[0].simd_ge(self.low[0]) & high[0].simd_le(self.high[0]);
+        (x & low[1].simd_ge(self.low[1]) & high[1].simd_le(self.high[1])).to_bitmask()
     }
 
     /// The lanes whose boxes are inside the clip along z.

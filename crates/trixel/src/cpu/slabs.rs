@@ -1,6 +1,7 @@
-//! The grid cut along x into slabs of whole columns, so that threads never write the same word.
+//! How threads share a grid without ever writing the same word.
 //!
-//! With one thread there is one slab. With more, threads first take triangles as they come and sort them into slabs: tiny
+//! One thread paints all of it. More paint a grid each, where it is small beside the mesh, and put those together. Larger
+//! grids are cut along x into slabs of whole columns: threads first take triangles as they come and sort them into slabs: tiny
 //! ones are decided at once, and their voxels kept in an [`outbox`](super::outbox); the others are for every slab that they
 //! meet. Then the slabs are painted, one a thread at a time: nobody waits for memory that another has changed, and what is
 //! painted fits a cache. Slabs hold about the same work each, and there are several a thread to level the rest.
@@ -23,7 +24,11 @@ pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut V
         // Outboxes have triangles as 32-bit numbers.
         let shared = dims[0] > 1 && u32::try_from(mesh.triangles.len()).is_ok();
         if threads > 1 && shared && parallel::weight_at_least(mesh, volume, WORTH_THREADS) {
-            parallel::voxelize(painter, mesh, volume, threads);
+            if parallel::copies_are_small(mesh, volume, threads) {
+                parallel::voxelize_in_copies(painter, mesh, volume, threads);
+            } else {
+                parallel::voxelize_in_slabs(painter, mesh, volume, threads);
+            }
             return;
         }
     }
@@ -50,7 +55,7 @@ mod parallel {
 
     use rayon::prelude::*;
 
-    use super::{LatticeMesh, Painter, Selected, VoxelBox, clip_of, prefix_xor};
+    use super::{LatticeMesh, Painter, Selected, Slab, VoxelBox, clip_of, prefix_xor};
     use crate::cpu::outbox::{Cuts, Outbox};
     use crate::cpu::triangles::corners;
     use crate::volume::Volume;
@@ -96,28 +101,95 @@ mod parallel {
         volume.words().len() > 1 << 18
     }
 
-    pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume, threads: usize) {
+    /// The triangles in pieces, for whoever comes first.
+    struct Chunks {
+        all: usize,
+        size: usize,
+        taken: AtomicUsize,
+    }
+
+    impl Chunks {
+        fn new(all: usize, threads: usize) -> Self {
+            Self { all, size: (all / (threads * CHUNKS)).clamp(CHUNK.start, CHUNK.end), taken: AtomicUsize::new(0) }
+        }
+
+        fn next(&self) -> Option<Range<usize>> {
+            let start = self.taken.fetch_add(self.size, Ordering::Relaxed);
+            (start < self.all).then(|| start..self.all.min(start + self.size))
+        }
+
+        fn all_taken(&self) -> bool {
+            self.taken.load(Ordering::Relaxed) >= self.all
+        }
+    }
+
+    /// Whether grids of their own for all threads cost less than sorting the triangles: measured, they do up to about a
+    /// word for each.
+    pub(super) fn copies_are_small(mesh: &LatticeMesh<'_>, volume: &Volume, threads: usize) -> bool {
+        volume.words().len().saturating_mul(threads) <= mesh.triangles.len()
+    }
+
+    /// Every thread paints into a grid of its own.
+    pub(super) fn voxelize_in_copies(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume, threads: usize) {
+        let dims = volume.grid().dims();
+        let (columns, column_words) = (dims[1] as usize, volume.column_words());
+        volume.clear();
+        let words = volume.words_mut();
+        let mut copies = vec![Vec::new(); threads - 1];
+        let chunks = Chunks::new(mesh.triangles.len(), threads);
+        let grid = clip_of(dims, 0..dims[0]);
+        let paint = |words: &mut [u64]| {
+            let mut slab = Slab { words, start: [0; 3], columns, column_words };
+            while let Some(range) = chunks.next() {
+                painter.paint(&Selected::range(mesh, range), &grid, slab.reborrow());
+            }
+        };
+        let length = words.len();
+        rayon::scope(|scope| {
+            for copy in &mut copies {
+                let (chunks, paint) = (&chunks, &paint);
+                scope.spawn(move |_| {
+                    // Whoever comes too late needs none.
+                    if !chunks.all_taken() {
+                        copy.resize(length, 0);
+                        paint(copy);
+                    }
+                });
+            }
+            paint(words);
+        });
+        let layer = columns * column_words;
+        words.par_chunks_mut(layer).enumerate().for_each(|(x, words)| {
+            for copy in copies.iter().filter(|copy| !copy.is_empty()) {
+                for (word, &copied) in words.iter_mut().zip(&copy[x * layer..]) {
+                    *word = if painter.toggles() { *word ^ copied } else { *word | copied };
+                }
+            }
+            if painter.toggles() {
+                prefix_xor(words, column_words, dims[2]);
+            }
+        });
+    }
+
+    /// Every thread paints slabs.
+    pub(super) fn voxelize_in_slabs(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume, threads: usize) {
         let dims = volume.grid().dims();
         let cuts = Cuts::new(cut(mesh, dims, threads * SLABS), dims[1] as usize, volume.column_words());
         let mut outboxes: Vec<_> = (0..threads).map(|_| Outbox::new(&cuts)).collect();
         let mut clean = volume.is_pristine();
         let words = volume.words_mut();
         let grid = clip_of(dims, 0..dims[0]);
-        let all = mesh.triangles.len();
-        let chunk = (all / (threads * CHUNKS)).clamp(CHUNK.start, CHUNK.end);
-        let taken = AtomicUsize::new(0);
+        let chunks = Chunks::new(mesh.triangles.len(), threads);
         loop {
             outboxes.par_iter_mut().with_max_len(1).for_each(|outbox| {
                 outbox.clear();
-                while !outbox.is_full() {
-                    let start = taken.fetch_add(chunk, Ordering::Relaxed);
-                    if start >= all {
-                        break;
-                    }
-                    painter.sort(&Selected::range(mesh, start..all.min(start + chunk)), &grid, outbox);
+                while !outbox.is_full()
+                    && let Some(range) = chunks.next()
+                {
+                    painter.sort(&Selected::range(mesh, range), &grid, outbox);
                 }
             });
-            let last = taken.load(Ordering::Relaxed) >= all;
+            let last = chunks.all_taken();
             cuts.slabs(words).into_par_iter().enumerate().with_max_len(1).for_each(|(i, mut slab)| {
                 if !clean {
                     slab.words.fill(0);
@@ -187,7 +259,7 @@ mod tests {
     use crate::lattice::LatticeMesh;
     use crate::{Backend, Grid, Job, Mode, Volume, scene};
 
-    /// Outboxes fill up several times, and every grid is cut through tiny triangles.
+    /// Outboxes fill up several times, and every grid is cut through tiny triangles; the smallest grids are copied.
     #[test]
     fn threads_paint_what_one_thread_does() {
         for (name, resolution) in [("sphere:48", 90), ("sphere:48", 33), ("room", 70)] {

@@ -74,6 +74,32 @@ impl<V: Simd> Boxes<V> {
     }
 }
 
+/// Sends the boxes of the lanes in `mask`, which are a voxel or a row of two.
+#[inline(always)]
+pub(super) fn send_boxes<V: Simd>(
+    low: &[i32x16<V>; 3],
+    extent: &[i32x16<V>; 3],
+    mask: u64,
+    clip: &NearClip<V>,
+    sink: &mut impl CubeSink,
+) {
+    const SIDE: usize = 2;
+    let mut corners = [[0; LANES]; 3];
+    for i in 0..3 {
+        low[i].store_slice(&mut corners[i]);
+    }
+    let places = sink.places(&corners, clip.base);
+    let mut bits = [0; LANES];
+    // The other end of the row is the cube's voxel 4, 2 or 1.
+    (extent[0] << 4 | extent[1] << 2 | extent[2] << 1 | 1).store_slice(&mut bits);
+    let mut left = mask;
+    while left != 0 {
+        let lane = left.trailing_zeros() as usize % LANES;
+        sink.cube::<SIDE>(&places, lane, u64::from(bits[lane].cast_unsigned()));
+        left &= left - 1;
+    }
+}
+
 /// Sends the voxels of the waiting triangles, whose boxes have at most `SIDE` voxels along each axis: of as many as fill
 /// vectors, or of all.
 #[inline(always)]
