@@ -269,12 +269,27 @@ impl Mesh {
     /// The box around every vertex that a triangle uses, or `None` when there is no triangle.
     #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
+        // First which vertices are used, a bit each, then every vertex once and in order: corner by corner, large meshes
+        // would be fetched from memory several times.
+        const BITS: usize = u64::BITS as usize;
+        let mut used = vec![0u64; self.positions.len().div_ceil(BITS)];
+        let mut highest = 0;
+        for &vertex in self.triangles.as_flattened() {
+            *used.get_mut(vertex as usize / BITS)? |= 1 << (vertex as usize % BITS);
+            highest = highest.max(vertex);
+        }
+        if highest as usize >= self.positions.len() {
+            return None;
+        }
         let mut bounds = Bounds { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
-        for &vertex in self.triangles.iter().flatten() {
-            let position = self.positions.get(vertex as usize)?;
-            for axis in 0..3 {
-                bounds.min[axis] = bounds.min[axis].min(position[axis]);
-                bounds.max[axis] = bounds.max[axis].max(position[axis]);
+        for (positions, used) in self.positions.chunks(BITS).zip(used) {
+            for (i, position) in positions.iter().enumerate() {
+                if used >> i & 1 != 0 {
+                    for axis in 0..3 {
+                        bounds.min[axis] = bounds.min[axis].min(position[axis]);
+                        bounds.max[axis] = bounds.max[axis].max(position[axis]);
+                    }
+                }
             }
         }
         (!self.triangles.is_empty()).then_some(bounds)
