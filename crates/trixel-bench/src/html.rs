@@ -177,12 +177,16 @@ fn figures(results: &Results, out: &mut String) {
         let lines = results.sweeps.iter().map(|sweep| {
             let samples = sweep.samples.iter().filter(|(cutoff, _)| *cutoff <= most);
             let points = samples.map(|(cutoff, time)| (f64::from(*cutoff), *time)).collect();
-            Line { name: format!("{} at {}", sweep.mesh, sweep.resolution), points }
+            Line { name: sweep.mesh.clone(), points }
         });
         lines.collect()
     };
-    plots.extend(plot("hybrid over its cutoff (figure 3.13)", "cutoff, square voxels", false, &sweeps(f32::INFINITY)));
-    plots.extend(plot("hybrid over low cutoffs (figure 3.14)", "cutoff, square voxels", false, &sweeps(16.0)));
+    // All sweeps are at the last resolution.
+    let at = results.sweeps.first().map_or(0, |sweep| sweep.resolution);
+    for (over, figure, most) in [("its cutoff", "3.13", f32::INFINITY), ("low cutoffs", "3.14", 16.0)] {
+        let title = format!("hybrid over {over} at {at} (figure {figure})");
+        plots.extend(plot(&title, "cutoff, square voxels", false, &sweeps(most)));
+    }
     if !plots.is_empty() {
         let _ = write!(
             out,

@@ -26,7 +26,9 @@ const COLORS: [RGBColor; 9] = [
     RGBColor(160, 140, 0),
 ];
 
-const SIZE: (u32, u32) = (720, 420);
+const SIZE: (u32, u32) = (760, 400);
+/// The legend's part of the width.
+const LEGEND: u32 = 190;
 
 /// A plot of times in milliseconds on a logarithmic axis; the horizontal one is logarithmic too if asked for, with a tick at
 /// every value that occurs. `None` when there is nothing to show.
@@ -35,10 +37,7 @@ pub fn plot(title: &str, across: &str, log_across: bool, lines: &[Line]) -> Opti
     let points = || lines.iter().flat_map(|line| &line.points);
     let (left, right) = low_high(points().map(|point| point.0))?;
     let (bottom, top) = low_high(points().map(|point| point.1.max(1e-3)))?;
-    // Room for the legend above the lines.
-    #[expect(clippy::cast_precision_loss, reason = "a handful of lines")]
-    let room = (top / bottom * 2.0).powf(0.09 * (lines.len() + 1) as f64);
-    let (bottom, top) = (bottom * 0.8, top * room);
+    let (bottom, top) = (bottom * 0.8, top * 1.25);
     let up = (bottom..top).log_scale().with_key_points(ticks(bottom, top));
     let mut svg = String::new();
     let drawn = if log_across {
@@ -81,35 +80,31 @@ where
 {
     let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&root)
+    let (left, legend) = root.split_horizontally(SIZE.0 - LEGEND);
+    let mut chart = ChartBuilder::on(&left)
         .caption(title, ("sans-serif", 18))
         .margin(12)
         .x_label_area_size(42)
         .y_label_area_size(64)
         .build_cartesian_2d(x, y)?;
+    let number = |value: &f64| value.to_string();
     chart
         .configure_mesh()
         .x_desc(across)
         .y_desc("ms")
+        .x_label_formatter(&number)
+        .y_label_formatter(&number)
         .label_style(("sans-serif", 13))
         .light_line_style(RGBColor(236, 236, 236))
         .bold_line_style(RGBColor(214, 214, 214))
         .draw()?;
-    for (line, color) in lines.iter().zip(COLORS.into_iter().cycle()) {
+    for ((line, color), at) in lines.iter().zip(COLORS.into_iter().cycle()).zip((56..).step_by(20)) {
         let style = color.stroke_width(2);
-        chart
-            .draw_series(LineSeries::new(line.points.iter().copied(), style))?
-            .label(&line.name)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+        chart.draw_series(LineSeries::new(line.points.iter().copied(), style))?;
         chart.draw_series(line.points.iter().map(|point| Circle::new(*point, 3, color.filled())))?;
+        legend.draw(&PathElement::new([(0, at), (18, at)], style))?;
+        legend.draw(&Text::new(line.name.as_str(), (24, at - 6), ("sans-serif", 13)))?;
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE.mix(0.85))
-        .border_style(RGBColor(214, 214, 214))
-        .label_font(("sans-serif", 13))
-        .draw()?;
     root.present()?;
     Ok(())
 }
