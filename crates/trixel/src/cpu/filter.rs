@@ -44,21 +44,23 @@ impl<const SIDE: usize> Cube<SIDE> {
     /// The cells of the projections to yz, zx and xy.
     pub(super) const CELLS: [Cells; 3] = [cells::<SIDE>(1, 2), cells::<SIDE>(2, 0), cells::<SIDE>(0, 1)];
     /// The layers across each axis.
-    pub(super) const LAYERS: [[Bits; MOST]; 3] = [layers::<SIDE>(0), layers::<SIDE>(1), layers::<SIDE>(2)];
+    pub(super) const LAYERS: [[Bits; MOST]; 3] = [across::<SIDE>(0), across::<SIDE>(1), across::<SIDE>(2)];
+    /// The cells of a layer.
+    const LAYER: Cells = layer::<SIDE>();
     /// The words of [`Bits`] in use.
     pub(super) const WORDS: usize = (SIDE * SIDE * SIDE).div_ceil(32);
 }
 
-/// The cells of a layer of 4 x 4 voxels: `(a, b)` is bit `4 a + b`.
-const LAYER: Cells = {
+/// The cells of a layer of voxels: `(a, b)` is bit `SIDE a + b`.
+const fn layer<const SIDE: usize>() -> Cells {
     let mut cells = [[[0; 2]; MOST]; MOST];
     let mut i = 0;
-    while i < MOST * MOST {
-        cells[i / MOST][i % MOST][0] = 1 << i;
+    while i < SIDE * SIDE {
+        cells[i / SIDE][i % SIDE][0] = 1 << i;
         i += 1;
     }
     cells
-};
+}
 
 /// The bit of a voxel.
 const fn bit<const SIDE: usize>(x: usize, y: usize, z: usize) -> Bits {
@@ -82,7 +84,7 @@ const fn cells<const SIDE: usize>(a: usize, b: usize) -> Cells {
 }
 
 /// The voxels of each layer across an axis.
-const fn layers<const SIDE: usize>(axis: usize) -> [Bits; MOST] {
+const fn across<const SIDE: usize>(axis: usize) -> [Bits; MOST] {
     let cells = cells::<SIDE>(axis, (axis + 1) % 3);
     let mut layers = [[0; 2]; MOST];
     let mut i = 0;
@@ -125,9 +127,9 @@ pub(super) fn cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
     Filtered { voxels, doubtful: tests.doubtful(simd) }
 }
 
-/// The cells `(a, b)` of 4 x 4 that projections meet: bit `4 a + b` of the first half.
+/// The cells `(a, b)` of `SIDE` by `SIDE` that projections meet: bit `SIDE a + b` of the first half.
 #[inline(always)]
-pub(super) fn layers_of_four<V: Simd, R: SurfaceRule>(
+pub(super) fn layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
     rule: &R,
     v: &[[f32x16<V>; 2]; 3],
@@ -136,7 +138,7 @@ pub(super) fn layers_of_four<V: Simd, R: SurfaceRule>(
     let mut tests = Tests::new(simd, longest);
     let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
     let area = tests.cross(&e, 0, 1);
-    let voxels = tests.edges::<R, 4>(simd, rule, *v, e, area, &LAYER);
+    let voxels = tests.edges::<R, SIDE>(simd, rule, *v, e, area, &Cube::<SIDE>::LAYER);
     Filtered { voxels, doubtful: tests.doubtful(simd) }
 }
 

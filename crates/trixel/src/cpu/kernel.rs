@@ -110,8 +110,16 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
                     );
                 }
             }
+            let shortest = extent[0].min(extent[1]).min(extent[2]);
+            let flat = if R::TOUCH_IS_ENOUGH { shortest.simd_le(0).to_bitmask() & tiny } else { 0 };
             let two = at_most(2) & tiny;
-            if two != 0 && waiting.twos.push(simd, &corners, two) {
+            if two & flat != 0 && waiting.flat_twos.push(simd, &corners, two & flat) {
+                simd.vectorize(
+                    #[inline(always)]
+                    || tiny::flush_flats::<_, _, 2>(simd, rule, &mut waiting.flat_twos, false, &near, sink),
+                );
+            }
+            if two & !flat != 0 && waiting.twos.push(simd, &corners, two & !flat) {
                 simd.vectorize(
                     #[inline(always)]
                     || tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, false, &near, sink),
@@ -119,18 +127,14 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
             }
             tiny &= !two;
             if tiny != 0 {
-                let mut rest = tiny;
-                if R::TOUCH_IS_ENOUGH {
-                    let shortest = extent[0].min(extent[1]).min(extent[2]);
-                    let flat = shortest.simd_le(0).to_bitmask() & tiny;
-                    if flat != 0 && waiting.flats.push(simd, &corners, flat) {
-                        simd.vectorize(
-                            #[inline(always)]
-                            || tiny::flush_flats(simd, rule, &mut waiting.flats, false, &near, sink),
-                        );
-                    }
-                    rest &= !flat;
+                let flat = flat & tiny;
+                if flat != 0 && waiting.flat_fours.push(simd, &corners, flat) {
+                    simd.vectorize(
+                        #[inline(always)]
+                        || tiny::flush_flats::<_, _, 4>(simd, rule, &mut waiting.flat_fours, false, &near, sink),
+                    );
                 }
+                let rest = tiny & !flat;
                 let three = at_most(3) & rest;
                 if three != 0 && waiting.threes.push(simd, &corners, three) {
                     simd.vectorize(
@@ -154,7 +158,8 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
     tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, true, &near, sink);
     tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, true, &near, sink);
     tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, true, &near, sink);
-    tiny::flush_flats(simd, rule, &mut waiting.flats, true, &near, sink);
+    tiny::flush_flats::<_, _, 2>(simd, rule, &mut waiting.flat_twos, true, &near, sink);
+    tiny::flush_flats::<_, _, 4>(simd, rule, &mut waiting.flat_fours, true, &near, sink);
 }
 
 /// [`surface`] for triangles that are not tiny.
@@ -284,13 +289,15 @@ struct Waiting {
     twos: Queue,
     threes: Queue,
     fours: Queue,
-    /// At most four voxels along two axes, and one along the third.
-    flats: Queue,
+    /// At most as many voxels along two axes, and one along the third.
+    flat_twos: Queue,
+    flat_fours: Queue,
 }
 
 impl Waiting {
     fn new() -> Self {
-        Self { twos: Queue::EMPTY, threes: Queue::EMPTY, fours: Queue::EMPTY, flats: Queue::EMPTY }
+        const NONE: Queue = Queue::EMPTY;
+        Self { twos: NONE, threes: NONE, fours: NONE, flat_twos: NONE, flat_fours: NONE }
     }
 }
 

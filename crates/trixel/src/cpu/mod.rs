@@ -48,11 +48,14 @@ use crate::mesh::MeshError;
 use crate::volume::{Volume, VolumeError};
 
 /// Voxelizes on the CPU. The result is the same for any number of threads.
+///
+/// It keeps up to 24 MiB of scratch memory between calls, so use one again rather than making another.
 #[derive(Debug, Default)]
 pub struct CpuBackend {
     #[cfg(feature = "threads")]
     pool: Option<rayon::ThreadPool>,
     instructions: Instructions,
+    spare: slabs::Spare,
 }
 
 /// The threads could not be started.
@@ -172,7 +175,7 @@ impl Backend for CpuBackend {
             return Err(Error::GridMismatch);
         }
         let painter = Painter::new(self.instructions.level(), job);
-        self.install(|| slabs::voxelize(&painter, mesh, volume));
+        self.install(|| slabs::voxelize(&painter, mesh, volume, &self.spare));
         Ok(strategy)
     }
 }

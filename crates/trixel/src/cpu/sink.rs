@@ -229,18 +229,8 @@ fn for_each_column(mut columns: u64, mut each: impl FnMut(usize)) {
 
 impl CubeSink for SetRuns<'_> {
     #[inline(always)]
-    #[expect(clippy::cast_sign_loss, reason = "too large, then")]
     fn places(&self, low: &[[i32; LANES]; 3], base: [i64; 3]) -> Places {
-        let places = Places::new(low, base, self.0.start, self.0.columns, self.0.column_words);
-        // Reads what will be changed, so that the memory is under way while voxels are still computed.
-        let (words, layer) = (&self.0.words, self.0.layer());
-        let mut seen = 0;
-        for &word in &places.word {
-            seen |= words.get(word as usize).copied().unwrap_or(0);
-            seen |= words.get((word as usize).wrapping_add(layer)).copied().unwrap_or(0);
-        }
-        std::hint::black_box(seen);
-        places
+        Places::new(low, base, self.0.start, self.0.columns, self.0.column_words)
     }
 
     #[inline(always)]

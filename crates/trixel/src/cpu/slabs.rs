@@ -13,8 +13,17 @@ use super::triangles::Selected;
 use crate::lattice::LatticeMesh;
 use crate::volume::Volume;
 
+/// Memory that is kept between calls.
+#[derive(Debug, Default)]
+pub(super) struct Spare {
+    /// The threads' copies of a grid, with no voxel set.
+    #[cfg(feature = "threads")]
+    copies: std::sync::Mutex<Vec<Vec<u64>>>,
+}
+
 /// Clears the volume and sets the voxels of the painter's mode.
-pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
+#[cfg_attr(not(feature = "threads"), expect(unused_variables, reason = "one thread needs no copies"))]
+pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume, spare: &Spare) {
     let dims = volume.grid().dims();
     #[cfg(feature = "threads")]
     {
@@ -25,7 +34,7 @@ pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut V
         let shared = dims[0] > 1 && u32::try_from(mesh.triangles.len()).is_ok();
         if threads > 1 && shared && parallel::weight_at_least(mesh, volume, WORTH_THREADS) {
             if parallel::copies_are_small(mesh, volume, threads) {
-                parallel::voxelize_in_copies(painter, mesh, volume, threads);
+                parallel::voxelize_in_copies(painter, mesh, volume, threads, spare);
             } else {
                 parallel::voxelize_in_slabs(painter, mesh, volume, threads);
             }
@@ -55,7 +64,7 @@ mod parallel {
 
     use rayon::prelude::*;
 
-    use super::{LatticeMesh, Painter, Selected, Slab, VoxelBox, clip_of, prefix_xor};
+    use super::{LatticeMesh, Painter, Selected, Slab, Spare, VoxelBox, clip_of, prefix_xor};
     use crate::cpu::outbox::{Cuts, Outbox};
     use crate::cpu::triangles::corners;
     use crate::volume::Volume;
@@ -65,8 +74,17 @@ mod parallel {
     /// Pieces of the triangles a thread, within limits of triangles.
     const CHUNKS: usize = 32;
     const CHUNK: Range<usize> = 1 << 10..1 << 12;
+    /// Pieces of the grid a thread, when copies are put together.
+    const PIECES: usize = 8;
     /// Triangles that are looked at to cut the grid.
     const SAMPLES: usize = 1 << 11;
+
+    impl Spare {
+        fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Vec<u64>>> {
+            // Nobody panics while holding it.
+            self.copies.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+        }
+    }
 
     /// The range of x that a triangle's box meets inside the grid, and the work that it stands for.
     #[inline(always)]
@@ -123,19 +141,33 @@ mod parallel {
         }
     }
 
-    /// Whether grids of their own for all threads cost less than sorting the triangles: measured, they do up to about a
-    /// word for each.
+    /// Whether grids of their own for all threads cost less than sorting the triangles: measured, they do as long as they
+    /// fit the cache that threads share, and are not large beside the mesh.
     pub(super) fn copies_are_small(mesh: &LatticeMesh<'_>, volume: &Volume, threads: usize) -> bool {
-        volume.words().len().saturating_mul(threads) <= mesh.triangles.len()
+        /// 24 MiB, and so few in tests that some grids are larger.
+        const MOST_WORDS: usize = if cfg!(test) { 1 << 16 } else { 3 << 20 };
+        /// For each triangle.
+        const WORDS: usize = 16;
+        let words = volume.words().len().saturating_mul(threads);
+        words <= MOST_WORDS && words / WORDS <= mesh.triangles.len()
     }
 
     /// Every thread paints into a grid of its own.
-    pub(super) fn voxelize_in_copies(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume, threads: usize) {
+    pub(super) fn voxelize_in_copies(
+        painter: &Painter,
+        mesh: &LatticeMesh<'_>,
+        volume: &mut Volume,
+        threads: usize,
+        spare: &Spare,
+    ) {
         let dims = volume.grid().dims();
         let (columns, column_words) = (dims[1] as usize, volume.column_words());
-        volume.clear();
+        let clean = volume.is_pristine();
         let words = volume.words_mut();
-        let mut copies = vec![Vec::new(); threads - 1];
+        let length = words.len();
+        // Whoever else comes meanwhile finds none.
+        let mut copies = std::mem::take(&mut *spare.lock());
+        copies.resize_with(threads - 1, Vec::new);
         let chunks = Chunks::new(mesh.triangles.len(), threads);
         let grid = clip_of(dims, 0..dims[0]);
         let paint = |words: &mut [u64]| {
@@ -144,31 +176,55 @@ mod parallel {
                 painter.paint(&Selected::range(mesh, range), &grid, slab.reborrow());
             }
         };
-        let length = words.len();
         rayon::scope(|scope| {
             for copy in &mut copies {
                 let (chunks, paint) = (&chunks, &paint);
                 scope.spawn(move |_| {
                     // Whoever comes too late needs none.
                     if !chunks.all_taken() {
-                        copy.resize(length, 0);
-                        paint(copy);
+                        if copy.len() < length {
+                            *copy = vec![0; length];
+                        }
+                        paint(&mut copy[..length]);
                     }
                 });
             }
+            if !clean {
+                words.fill(0);
+            }
             paint(words);
         });
-        let layer = columns * column_words;
-        words.par_chunks_mut(layer).enumerate().for_each(|(x, words)| {
-            for copy in copies.iter().filter(|copy| !copy.is_empty()) {
-                for (word, &copied) in words.iter_mut().zip(&copy[x * layer..]) {
-                    *word = if painter.toggles() { *word ^ copied } else { *word | copied };
-                }
+        // Whole layers, as many as leave each thread several pieces.
+        let piece = columns * column_words * (dims[0] as usize).div_ceil(threads * PIECES);
+        let mut pieces: Vec<_> = words.chunks_mut(piece).map(|words| (words, Vec::new())).collect();
+        for copy in copies.iter_mut().filter(|copy| !copy.is_empty()) {
+            for ((_, parts), part) in pieces.iter_mut().zip(copy[..length].chunks_mut(piece)) {
+                parts.push(part);
+            }
+        }
+        pieces.into_par_iter().with_max_len(1).for_each(|(words, parts)| {
+            for part in parts {
+                move_voxels(part, words, painter.toggles());
             }
             if painter.toggles() {
                 prefix_xor(words, column_words, dims[2]);
             }
         });
+        *spare.lock() = copies;
+    }
+
+    /// Moves the voxels or toggles of a copy, most of whose words have none.
+    fn move_voxels(from: &mut [u64], to: &mut [u64], toggles: bool) {
+        /// A cache line.
+        const LINE: usize = 8;
+        for (to, from) in to.chunks_mut(LINE).zip(from.chunks_mut(LINE)) {
+            if from.iter().fold(0, |all, word| all | word) != 0 {
+                for (to, from) in to.iter_mut().zip(&mut *from) {
+                    *to = if toggles { *to ^ *from } else { *to | *from };
+                }
+                from.fill(0);
+            }
+        }
     }
 
     /// Every thread paints slabs.
@@ -259,19 +315,22 @@ mod tests {
     use crate::lattice::LatticeMesh;
     use crate::{Backend, Grid, Job, Mode, Volume, scene};
 
-    /// Outboxes fill up several times, and every grid is cut through tiny triangles; the smallest grids are copied.
+    /// Outboxes fill up several times, and every grid is cut through tiny triangles; small grids are copied, into memory
+    /// that was used for others.
     #[test]
     fn threads_paint_what_one_thread_does() {
-        for (name, resolution) in [("sphere:48", 90), ("sphere:48", 33), ("room", 70)] {
+        let backends = [1, 7].map(|threads| CpuBackend::with_threads(threads).unwrap());
+        for (name, resolution) in
+            [("sphere:48", 33), ("room", 70), ("sphere:48", 90), ("sphere:48", 40), ("sphere:48", 30)]
+        {
             let mesh = scene::build(name).unwrap();
             let grid = Grid::fit(&mesh.bounds().unwrap(), resolution).unwrap();
             let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
             for mode in Mode::ALL {
-                let [one, seven] = [1, 7].map(|threads| {
+                let [one, seven] = backends.each_ref().map(|backend| {
                     let mut volume = Volume::new(grid).unwrap();
                     // What was there before does not matter.
                     volume.words_mut().fill(u64::MAX);
-                    let backend = CpuBackend::with_threads(threads).unwrap();
                     backend.voxelize(&lattice, &Job::new(grid, mode), &mut volume).unwrap();
                     volume
                 });

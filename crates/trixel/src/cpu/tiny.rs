@@ -4,7 +4,7 @@
 //! lanes. That is exact, as everything is integers below 2^53: corners are below 2^18 steps from the box's corner, edge
 //! functions below 2^38, normals below 2^36, and the plane's terms below 2^53 ([`SurfaceRule::plane_bounds`]).
 
-use fearless_simd::{Simd, f32x16, f64x8, i32x16, i64x8, prelude::*};
+use fearless_simd::{Simd, f32x16, f64x8, i32x16, i64x8, mask32x16, prelude::*};
 
 use super::filter::{self, Cube, Filtered, Voxels};
 use super::kernel::NearClip;
@@ -148,10 +148,10 @@ fn cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
     send::<_, SIDE>(&voxels, count, &places, sink);
 }
 
-/// [`flush`] for boxes of at most four voxels along two axes and one along the third: strictly inside their layer,
-/// triangles meet a voxel where their projections meet.
+/// [`flush`] for boxes of one voxel along some axis: strictly inside their layer, triangles meet a voxel where their
+/// projections meet.
 #[inline(always)]
-pub(super) fn flush_flats<V: Simd, R: SurfaceRule>(
+pub(super) fn flush_flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
     rule: &R,
     waiting: &mut Queue,
@@ -165,7 +165,7 @@ pub(super) fn flush_flats<V: Simd, R: SurfaceRule>(
         if count == 0 {
             break;
         }
-        flats(simd, rule, waiting, first, count, clip, sink);
+        flats::<_, _, SIDE>(simd, rule, waiting, first, count, clip, sink);
         first += LANES;
     }
     waiting.keep(simd, first);
@@ -173,7 +173,7 @@ pub(super) fn flush_flats<V: Simd, R: SurfaceRule>(
 
 /// [`flush_flats`] of `count` of the lanes from `first` on.
 #[inline(always)]
-fn flats<V: Simd, R: SurfaceRule>(
+fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
     rule: &R,
     waiting: &Queue,
@@ -183,7 +183,6 @@ fn flats<V: Simd, R: SurfaceRule>(
     sink: &mut impl CubeSink,
 ) {
     let corners = waiting.vectors(simd, first);
-    const SIDE: usize = 4;
     let boxes = Boxes::new(simd, &corners);
     let places = boxes.places(clip, sink);
     // The axes (a, b) of the layer, ascending; of a row of voxels, one of its two layers.
@@ -200,16 +199,18 @@ fn flats<V: Simd, R: SurfaceRule>(
     let v = flattened.floats([i32x16::splat(simd, 0); 3], PER_HALF);
     let layer = [[v[0][0], v[0][1]], [v[1][0], v[1][1]], [v[2][0], v[2][1]]];
     let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
-    let Filtered { mut voxels, doubtful } = filter::layers_of_four(simd, rule, &layer, longest);
+    let Filtered { mut voxels, doubtful } = filter::layers::<_, _, SIDE>(simd, rule, &layer, longest);
     if doubtful & used(count) != 0 {
         voxels = exact_cubes::<_, _, SIDE>(simd, rule, waiting, first);
+    } else if SIDE == 2 {
+        voxels[0] = spread_two(voxels[0], along_x, along_z);
     } else {
         let mut cells = [0; LANES];
         voxels[0].store_slice(&mut cells);
         let (along_x, along_z) = (along_x.to_bitmask(), along_z.to_bitmask());
         let mut words = [[0; LANES]; 2];
         for lane in 0..LANES {
-            let cube = spread(cells[lane], along_x >> lane & 1 != 0, along_z >> lane & 1 != 0);
+            let cube = spread_four(cells[lane], along_x >> lane & 1 != 0, along_z >> lane & 1 != 0);
             #[expect(clippy::cast_possible_truncation, reason = "the halves")]
             {
                 words[0][lane] = cube as i32;
@@ -236,10 +237,19 @@ fn used(count: usize) -> u64 {
     (1 << count) - 1
 }
 
-/// Bit `4 a + b` of a layer of 4 x 4 voxels to the bit of its voxel in a cube: a layer across x if `along_x`, across z if
+/// Bit `2 a + b` of a layer of 2 x 2 voxels to the bit of its voxel in a cube: a layer across x if `along_x`, across z if
 /// `along_z`, or else across y.
 #[inline(always)]
-fn spread(cells: i32, along_x: bool, along_z: bool) -> u64 {
+fn spread_two<V: Simd>(cells: i32x16<V>, along_x: mask32x16<V>, along_z: mask32x16<V>) -> i32x16<V> {
+    // Each row's two bits to every fourth, each bit to every other.
+    let rows = (cells | cells << 2) & 0b0011_0011;
+    let bits = (rows | rows << 1) & 0b0101_0101;
+    along_x.select(cells, along_z.select(bits, rows))
+}
+
+/// [`spread_two`] for a layer of 4 x 4.
+#[inline(always)]
+fn spread_four(cells: i32, along_x: bool, along_z: bool) -> u64 {
     // Each row's four bits to every 16th, each bit to every fourth.
     let row = u64::from(cells.cast_unsigned());
     let rows = (row | row << 24) & 0x0000_00ff_0000_00ff;
