@@ -25,17 +25,20 @@ impl Topology {
     /// Counts edges and faces of `mesh`. Triangles with an index out of range are left out.
     #[must_use]
     pub fn of(mesh: &Mesh) -> Self {
-        let (merged, vertices) = merge_positions(mesh);
-        let mut topology = Self { vertices, ..Self::default() };
-        let triangles = || mesh.triangles.iter().filter(|t| t.iter().all(|&v| (v as usize) < mesh.positions.len()));
+        let (degenerate_triangles, topology) = both(|| degenerate_triangles(mesh), || Self::of_edges(mesh));
+        Self { degenerate_triangles, ..topology }
+    }
 
+    /// All but the triangles without area.
+    fn of_edges(mesh: &Mesh) -> Self {
+        let (triangles, vertices) = numbered_as_met(mesh);
+        let mut topology = Self { vertices, ..Self::default() };
         // Edges by their smaller vertex, in one array.
-        let mut starts = vec![0usize; vertices + 1];
-        let edges = |triangle: &[u32; 3]| {
-            let [a, b, c] = triangle.map(|v| merged[v as usize]);
+        let edges = |&[a, b, c]: &[u32; 3]| {
             [(a, b), (b, c), (c, a)].into_iter().filter(|(v, w)| v != w).map(|(v, w)| (v.min(w), v.max(w)))
         };
-        for (v, _) in triangles().flat_map(edges) {
+        let mut starts = vec![0usize; vertices + 1];
+        for (v, _) in triangles.iter().flat_map(edges) {
             starts[v as usize + 1] += 1;
         }
         for i in 1..starts.len() {
@@ -43,15 +46,14 @@ impl Topology {
         }
         let mut ends = vec![0u32; starts[vertices]];
         let mut next = starts.clone();
+        let mut joined = 0;
         let mut pieces = Pieces::new(vertices);
-        for triangle in triangles() {
-            for (v, w) in edges(triangle) {
-                ends[next[v as usize]] = w;
-                next[v as usize] += 1;
-                pieces.join(v, w);
-            }
-            topology.degenerate_triangles += usize::from(is_degenerate(triangle.map(|v| mesh.positions[v as usize])));
+        for (v, w) in triangles.iter().flat_map(edges) {
+            ends[next[v as usize]] = w;
+            next[v as usize] += 1;
+            joined += usize::from(pieces.join(v, w));
         }
+        topology.components = vertices - joined;
         for v in 0..vertices {
             let ends = &mut ends[starts[v]..starts[v + 1]];
             ends.sort_unstable();
@@ -64,7 +66,6 @@ impl Topology {
                 }
             }
         }
-        topology.components = pieces.count();
         topology
     }
 
@@ -73,6 +74,26 @@ impl Topology {
     pub fn is_closed(&self) -> bool {
         self.open_edges == 0 && self.non_manifold_edges == 0
     }
+}
+
+/// Does both, at once where there are threads.
+#[cfg(feature = "threads")]
+fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
+    rayon::join(a, b)
+}
+
+#[cfg(not(feature = "threads"))]
+fn both<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
+    (a(), b())
+}
+
+/// The triangles without an index out of range.
+fn whole_triangles(mesh: &Mesh) -> impl Iterator<Item = [u32; 3]> {
+    mesh.triangles.iter().copied().filter(|t| t.iter().all(|&v| (v as usize) < mesh.positions.len()))
+}
+
+fn degenerate_triangles(mesh: &Mesh) -> usize {
+    whole_triangles(mesh).filter(|t| is_degenerate(t.map(|v| mesh.positions[v as usize]))).count()
 }
 
 fn is_degenerate([a, b, c]: [[f64; 3]; 3]) -> bool {
@@ -84,31 +105,58 @@ fn is_degenerate([a, b, c]: [[f64; 3]; 3]) -> bool {
     })
 }
 
-/// For each vertex the number of its merged vertex, and how many of those there are. Unused vertices get 0.
-fn merge_positions(mesh: &Mesh) -> (Vec<u32>, usize) {
-    let mut used = vec![false; mesh.positions.len()];
-    for &vertex in mesh.triangles.as_flattened() {
-        if let Some(used) = used.get_mut(vertex as usize) {
-            *used = true;
+/// The triangles with merged vertices, numbered as they are first met, and how many of those there are. Triangles that follow
+/// each other are mostly neighbours, whatever the order of the file's vertices: what is looked up by such numbers is in the
+/// cache.
+fn numbered_as_met(mesh: &Mesh) -> (Vec<[u32; 3]>, usize) {
+    const NONE: u32 = u32::MAX;
+    let merged = merge_positions(mesh);
+    let mut numbers = vec![NONE; merged.len()];
+    let mut count = 0;
+    let mut number = |vertex: u32| {
+        let vertex = vertex as usize;
+        // Most were met before, and need no second look-up.
+        if numbers[vertex] == NONE {
+            let first = merged[vertex] as usize;
+            if numbers[first] == NONE {
+                numbers[first] = count;
+                count += 1;
+            }
+            numbers[vertex] = numbers[first];
         }
-    }
+        numbers[vertex]
+    };
+    let triangles = whole_triangles(mesh).map(|triangle| triangle.map(&mut number)).collect();
+    (triangles, count as usize)
+}
+
+/// For each vertex the first one at its position.
+fn merge_positions(mesh: &Mesh) -> Vec<u32> {
     // Adding 0 turns -0 into 0.
-    let bits = |p: &[f64; 3]| p.map(|c| (c + 0.0).to_bits());
-    let mut keys: Vec<([u64; 3], u32)> =
-        (0u32..).zip(&mesh.positions).filter(|&(i, _)| used[i as usize]).map(|(i, p)| (bits(p), i)).collect();
+    let bits = |vertex: u32| mesh.positions[vertex as usize].map(|c| (c + 0.0).to_bits());
+    let mut merged: Vec<u32> = (0u32..).take(mesh.positions.len()).collect();
+    let mut keys: Vec<(u64, u32)> = merged.iter().map(|&vertex| (hash(bits(vertex)), vertex)).collect();
     #[cfg(feature = "threads")]
     rayon::slice::ParallelSliceMut::par_sort_unstable(keys.as_mut_slice());
     #[cfg(not(feature = "threads"))]
     keys.sort_unstable();
-    let mut merged = vec![0u32; mesh.positions.len()];
-    let mut count = 0u32;
-    for same in keys.chunk_by(|a, b| a.0 == b.0) {
-        for &(_, vertex) in same {
-            merged[vertex as usize] = count;
+    for same_hash in keys.chunk_by_mut(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
+        // Different positions with one hash are hardly ever there.
+        same_hash.sort_unstable_by_key(|&(_, vertex)| (bits(vertex), vertex));
+        for same in same_hash.chunk_by(|a, b| bits(a.1) == bits(b.1)) {
+            for &(_, vertex) in same {
+                merged[vertex as usize] = same[0].1;
+            }
         }
-        count += 1;
     }
-    (merged, count as usize)
+    merged
+}
+
+/// Numbers that differ for nearly all positions.
+fn hash(bits: [u64; 3]) -> u64 {
+    // 2^64 over the golden ratio.
+    const MULTIPLIER: u64 = 0x9e37_79b9_7f4a_7c15;
+    bits.iter().fold(0u64, |hash, bits| (hash.rotate_left(23) ^ bits).wrapping_mul(MULTIPLIER).rotate_right(32))
 }
 
 /// Union-find with path halving.
@@ -127,13 +175,11 @@ impl Pieces {
         v
     }
 
-    fn join(&mut self, v: u32, w: u32) {
+    /// Whether they were in different pieces.
+    fn join(&mut self, v: u32, w: u32) -> bool {
         let (v, w) = (self.root(v), self.root(w));
         self.0[v.max(w) as usize] = v.min(w);
-    }
-
-    fn count(&self) -> usize {
-        (0u32..).zip(&self.0).filter(|&(v, &parent)| v == parent).count()
+        v != w
     }
 }
 
