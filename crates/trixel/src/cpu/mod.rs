@@ -49,7 +49,8 @@ use crate::volume::{Volume, VolumeError};
 
 /// Voxelizes on the CPU. The result is the same for any number of threads.
 ///
-/// It keeps up to 24 MiB of scratch memory between calls, so use one again rather than making another.
+/// With several threads it keeps scratch memory between calls, up to 24 MiB and 16 MiB a thread, so use one again rather than
+/// making another.
 #[derive(Debug, Default)]
 pub struct CpuBackend {
     #[cfg(feature = "threads")]

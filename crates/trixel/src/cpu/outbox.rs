@@ -63,8 +63,8 @@ impl Cuts {
 }
 
 /// What waits for one slab.
-#[derive(Default)]
-struct Compartment {
+#[derive(Debug, Default)]
+pub(super) struct Compartment {
     /// Cubes of 2^3 voxels, or toggles: a place and the bits.
     small: Vec<u64>,
     /// Larger cubes: their bits, and a place with 0 or 1 for a side of 3 or 4.
@@ -88,8 +88,15 @@ impl<'a> Outbox<'a> {
     /// Entries that it should hold at most, or little more: 8 to 16 MiB, and so few in tests that some leave more.
     const MOST_ENTRIES: usize = if cfg!(test) { 1 << 10 } else { 1 << 20 };
 
-    pub(super) fn new(cuts: &'a Cuts) -> Self {
-        Self { cuts, slabs: (0..cuts.len()).map(|_| Compartment::default()).collect() }
+    /// Uses the memory of `kept` compartments.
+    pub(super) fn new(cuts: &'a Cuts, mut kept: Vec<Compartment>) -> Self {
+        kept.resize_with(cuts.len(), Compartment::default);
+        Self { cuts, slabs: kept }
+    }
+
+    /// The compartments, to be used again.
+    pub(super) fn into_compartments(self) -> Vec<Compartment> {
+        self.slabs
     }
 
     /// Whether the slabs should be painted before more is put in.

@@ -13,12 +13,11 @@ use super::triangles::Selected;
 use crate::lattice::LatticeMesh;
 use crate::volume::Volume;
 
-/// Memory that is kept between calls.
+/// Memory that is kept between calls. Whoever else comes meanwhile finds none.
 #[derive(Debug, Default)]
 pub(super) struct Spare {
-    /// The threads' copies of a grid, with no voxel set.
     #[cfg(feature = "threads")]
-    copies: std::sync::Mutex<Vec<Vec<u64>>>,
+    kept: std::sync::Mutex<parallel::Kept>,
 }
 
 /// Clears the volume and sets the voxels of the painter's mode.
@@ -36,7 +35,7 @@ pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut V
             if parallel::copies_are_small(mesh, volume, threads) {
                 parallel::voxelize_in_copies(painter, mesh, volume, threads, spare);
             } else {
-                parallel::voxelize_in_slabs(painter, mesh, volume, threads);
+                parallel::voxelize_in_slabs(painter, mesh, volume, threads, spare);
             }
             return;
         }
@@ -65,7 +64,7 @@ mod parallel {
     use rayon::prelude::*;
 
     use super::{LatticeMesh, Painter, Selected, Slab, Spare, VoxelBox, clip_of, prefix_xor};
-    use crate::cpu::outbox::{Cuts, Outbox};
+    use crate::cpu::outbox::{Compartment, Cuts, Outbox};
     use crate::cpu::triangles::corners;
     use crate::volume::Volume;
 
@@ -79,10 +78,18 @@ mod parallel {
     /// Triangles that are looked at to cut the grid.
     const SAMPLES: usize = 1 << 11;
 
+    #[derive(Debug, Default)]
+    pub(super) struct Kept {
+        /// Threads' copies of a grid, with no voxel set.
+        copies: Vec<Vec<u64>>,
+        /// Threads' outboxes.
+        outboxes: Vec<Vec<Compartment>>,
+    }
+
     impl Spare {
-        fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Vec<u64>>> {
+        fn lock(&self) -> std::sync::MutexGuard<'_, Kept> {
             // Nobody panics while holding it.
-            self.copies.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+            self.kept.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
         }
     }
 
@@ -165,8 +172,7 @@ mod parallel {
         let clean = volume.is_pristine();
         let words = volume.words_mut();
         let length = words.len();
-        // Whoever else comes meanwhile finds none.
-        let mut copies = std::mem::take(&mut *spare.lock());
+        let mut copies = std::mem::take(&mut spare.lock().copies);
         copies.resize_with(threads - 1, Vec::new);
         let chunks = Chunks::new(mesh.triangles.len(), threads);
         let grid = clip_of(dims, 0..dims[0]);
@@ -210,7 +216,7 @@ mod parallel {
                 prefix_xor(words, column_words, dims[2]);
             }
         });
-        *spare.lock() = copies;
+        spare.lock().copies = copies;
     }
 
     /// Moves the voxels or toggles of a copy, most of whose words have none.
@@ -228,10 +234,18 @@ mod parallel {
     }
 
     /// Every thread paints slabs.
-    pub(super) fn voxelize_in_slabs(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume, threads: usize) {
+    pub(super) fn voxelize_in_slabs(
+        painter: &Painter,
+        mesh: &LatticeMesh<'_>,
+        volume: &mut Volume,
+        threads: usize,
+        spare: &Spare,
+    ) {
         let dims = volume.grid().dims();
         let cuts = Cuts::new(cut(mesh, dims, threads * SLABS), dims[1] as usize, volume.column_words());
-        let mut outboxes: Vec<_> = (0..threads).map(|_| Outbox::new(&cuts)).collect();
+        let mut kept = std::mem::take(&mut spare.lock().outboxes);
+        kept.resize_with(threads, Vec::new);
+        let mut outboxes: Vec<_> = kept.into_iter().map(|kept| Outbox::new(&cuts, kept)).collect();
         let mut clean = volume.is_pristine();
         let words = volume.words_mut();
         let grid = clip_of(dims, 0..dims[0]);
@@ -263,6 +277,7 @@ mod parallel {
             }
             clean = true;
         }
+        spare.lock().outboxes = outboxes.into_iter().map(Outbox::into_compartments).collect();
     }
 
     /// Where to cut x so that each of up to `pieces` slabs holds about the same work; first 0, last nx.
