@@ -1,6 +1,6 @@
 //! How threads share a grid without ever writing the same word.
 //!
-//! One thread paints all of it. More paint a grid each, where it is small beside the mesh, and put those together. Larger
+//! One thread paints all of it. More paint a grid each, where those fit a cache, and put them together. Larger
 //! grids are cut along x into slabs of whole columns: threads first take triangles as they come and sort them into slabs: tiny
 //! ones are decided at once, and their voxels kept in an [`outbox`](super::outbox); the others are for every slab that they
 //! meet. Then the slabs are painted, one a thread at a time: nobody waits for memory that another has changed, and what is
