@@ -29,6 +29,7 @@ fn main() {
             println!("{:48} {}", line.name, points.join(", "));
         }
         if let Some(folder) = &folder {
+            std::fs::create_dir_all(folder).unwrap();
             std::fs::write(folder.join(file), plot(title, across, true, lines).unwrap()).unwrap();
         }
     };
