@@ -1,5 +1,5 @@
-//! Mode solid for triangles whose box is at most four voxels along each axis: where the lines through the centres of at
-//! most two by two columns cross them, sixteen triangles at a time, in two halves of eight lanes.
+//! Mode solid for triangles whose box is at most four voxels along each axis: where the lines through the centres of its
+//! columns cross them, sixteen triangles at a time, in two halves of eight lanes.
 //!
 //! Everything is f64 holding integers below 2^53, so it is exact: corners are within 2^18 steps of the first column's
 //! centre, edge functions below 2^38, normals below 2^36, and the plane's terms below 3 * 2^36 * 2^15.
@@ -28,10 +28,13 @@ pub(super) fn columns<V: Simd>(corners: &Vectors<V>, clip: &NearClip<V>) -> [[i3
     columns
 }
 
+/// How far columns are from the first, for whoever needs that as a number of another kind.
+const DISTANCES: [i32; 4] = [0, 1, 2, 3];
+
 /// Sends the runs, from the lowest voxel whose centre is not below the triangle to the top of the clip, of the waiting
-/// triangles: of as many as fill vectors, or of all.
+/// triangles, with centres of at most `SIDE` columns along x and y: of as many as fill vectors, or of all.
 #[inline(always)]
-pub(super) fn flush<V: Simd>(
+pub(super) fn flush<V: Simd, const SIDE: usize>(
     simd: V,
     waiting: &mut Queue,
     all: bool,
@@ -46,7 +49,7 @@ pub(super) fn flush<V: Simd>(
             break;
         }
         let corners = waiting.vectors(simd, first);
-        cross_columns(simd, &corners, count, near, clip, sink);
+        cross_columns::<_, SIDE>(simd, &corners, count, near, clip, sink);
         first += LANES;
     }
     waiting.keep(simd, first);
@@ -54,7 +57,7 @@ pub(super) fn flush<V: Simd>(
 
 /// [`flush`] of the first `count` lanes.
 #[inline(always)]
-fn cross_columns<V: Simd>(
+fn cross_columns<V: Simd, const SIDE: usize>(
     simd: V,
     corners: &Vectors<V>,
     count: usize,
@@ -66,8 +69,14 @@ fn cross_columns<V: Simd>(
     let z = (corners.least(2) - 1) >> STEP_BITS;
     let middle = [(x << STEP_BITS) + HALF, (y << STEP_BITS) + HALF, (z << STEP_BITS) + HALF];
     let halves = corners.halves(simd, middle, 1.0);
-    let second = [x.simd_lt(x_last).to_bitmask(), y.simd_lt(y_last).to_bitmask()];
     let used = (1u64 << count) - 1;
+    // The lanes that have a column so far from the first.
+    let mut along_x = [used; SIDE];
+    let mut along_y = [u64::MAX; SIDE];
+    for d in 1..SIDE {
+        along_x[d] &= (x + DISTANCES[d]).simd_le(x_last).to_bitmask();
+        along_y[d] &= (y + DISTANCES[d]).simd_le(y_last).to_bitmask();
+    }
 
     let mut at = [[0; LANES]; 3];
     for (axis, low) in [x, y, z].into_iter().enumerate() {
@@ -76,19 +85,13 @@ fn cross_columns<V: Simd>(
     for (half, v) in halves.iter().enumerate() {
         let shift = half * LANES / 2;
         let crossed = Crossed::new(simd, v);
-        for (dx, dy) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let mut lanes = used;
-            if dx == 1 {
-                lanes &= second[0];
-            }
-            if dy == 1 {
-                lanes &= second[1];
-            }
-            lanes = lanes >> shift & 0xff;
+        for column in 0..SIDE * SIDE {
+            let (dx, dy) = (column / SIDE, column % SIDE);
+            let mut lanes = (along_x[dx] & along_y[dy]) >> shift & 0xff;
             if lanes == 0 {
                 continue;
             }
-            let (passing, height) = crossed.at(f64::from(dx), f64::from(dy));
+            let (passing, height) = crossed.at(dx, dy);
             let mut heights = [0.0; LANES / 2];
             height.store_slice(&mut heights);
             lanes &= passing;
@@ -99,7 +102,8 @@ fn cross_columns<V: Simd>(
                 #[expect(clippy::cast_possible_truncation, reason = "within a few voxels of the box")]
                 let z = (z + near.base[2] + heights[lane] as i64).max(clip.low[2]);
                 if z <= clip.high[2] {
-                    let [x, y] = [x + near.base[0] + i64::from(dx), y + near.base[1] + i64::from(dy)];
+                    let [x, y] =
+                        [x + near.base[0] + i64::from(DISTANCES[dx]), y + near.base[1] + i64::from(DISTANCES[dy])];
                     sink.run(x, y, z, clip.high[2]);
                 }
             }
@@ -152,7 +156,8 @@ impl<V: Simd> Crossed<V> {
     /// The lanes whose triangle is crossed by the line `(dx, dy)` columns from the first, and the lowest voxels that are
     /// not below.
     #[inline(always)]
-    fn at(&self, dx: f64, dy: f64) -> (u64, f64x8<V>) {
+    fn at(&self, dx: usize, dy: usize) -> (u64, f64x8<V>) {
+        let (dx, dy) = (f64::from(DISTANCES[dx]), f64::from(DISTANCES[dy]));
         let mut passing = self.slanted;
         for edge in &self.edges {
             passing &= (edge.at + edge.step[0] * dx + edge.step[1] * dy).simd_gt(edge.beyond);

@@ -306,7 +306,8 @@ impl Waiting {
 #[inline(always)]
 pub(super) fn solid<V: Simd>(simd: V, rule: &Solid, triangles: &Selected<'_>, clip: &VoxelBox, sink: &mut impl Sink) {
     let mut scratch = Scratch::default();
-    let mut waiting = Queue::EMPTY;
+    // Those with centres of at most two by two columns, and of four by four.
+    let (mut twos, mut fours) = (Queue::EMPTY, Queue::EMPTY);
     let base = triangles.base(clip);
     let near = NearClip::new(simd, clip, base);
     for_each_vector(
@@ -327,11 +328,18 @@ pub(super) fn solid<V: Simd>(simd: V, rule: &Solid, triangles: &Selected<'_>, cl
             }
             let [low, high] = corners.boxes();
             let longest = (high[0] - low[0]).max(high[1] - low[1]).max(high[2] - low[2]);
-            let tiny = few & some & longest.simd_le(3).to_bitmask();
-            if tiny != 0 && waiting.push(simd, &corners, tiny) {
+            let tiny = some & longest.simd_le(3).to_bitmask();
+            let (two, four) = (tiny & few, tiny & !few);
+            if two != 0 && twos.push(simd, &corners, two) {
                 simd.vectorize(
                     #[inline(always)]
-                    || crossings::flush(simd, &mut waiting, false, &near, clip, sink),
+                    || crossings::flush::<_, 2>(simd, &mut twos, false, &near, clip, sink),
+                );
+            }
+            if four != 0 && fours.push(simd, &corners, four) {
+                simd.vectorize(
+                    #[inline(always)]
+                    || crossings::flush::<_, 4>(simd, &mut fours, false, &near, clip, sink),
                 );
             }
             for lane in set_bits(some & !tiny) {
@@ -339,7 +347,8 @@ pub(super) fn solid<V: Simd>(simd: V, rule: &Solid, triangles: &Selected<'_>, cl
             }
         },
     );
-    crossings::flush(simd, &mut waiting, true, &near, clip, sink);
+    crossings::flush::<_, 2>(simd, &mut twos, true, &near, clip, sink);
+    crossings::flush::<_, 4>(simd, &mut fours, true, &near, clip, sink);
 }
 
 /// Sends the voxels of mode sliced, or the toggles of mode solid, inside `clip` to `sink`: one triangle after the other.
