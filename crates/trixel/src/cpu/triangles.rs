@@ -117,27 +117,49 @@ pub(super) fn corners(mesh: &LatticeMesh<'_>, [a, b, c]: [u32; 3]) -> [[i64; 3];
     [corner(a), corner(b), corner(c)]
 }
 
-/// Corners of up to `N` triangles in lattice steps, axis by axis: corner k's axis i is row `3 k + i`.
-pub(super) struct Corners<const N: usize> {
-    rows: [[i32; N]; 9],
+/// The corners of the triangles of one load.
+pub(super) struct Block {
+    /// Of each corner, x and y of one triangle after the other.
+    xy: [[[i32; 2]; BLOCK]; 3],
+    z: [[i32; BLOCK]; 3],
 }
 
-/// The triangles of one load.
-pub(super) type Block = Corners<BLOCK>;
-
-impl<const N: usize> Corners<N> {
-    pub(super) const NONE: Self = Self { rows: [[0; N]; 9] };
+impl Block {
+    pub(super) const NONE: Self = Self { xy: [[[0; 2]; BLOCK]; 3], z: [[0; BLOCK]; 3] };
 
     #[inline(always)]
     fn fill<T>(&mut self, from: &[T], triangle: impl Fn(&T) -> [u32; 3], corner: impl Fn(u32) -> [i32; 3]) {
-        for (lane, from) in from.iter().enumerate().take(N) {
-            let [a, b, c] = triangle(from).map(&corner);
-            let all = [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]];
-            for (row, coordinate) in self.rows.iter_mut().zip(all) {
-                row[lane] = coordinate;
+        for (lane, from) in from.iter().enumerate().take(BLOCK) {
+            let triangle = triangle(from);
+            for k in 0..3 {
+                let [x, y, z] = corner(triangle[k]);
+                self.xy[k][lane] = [x, y];
+                self.z[k][lane] = z;
             }
         }
     }
+
+    /// The corners of the [`LANES`] triangles from `first` on.
+    #[inline(always)]
+    pub(super) fn vectors<V: Simd>(&self, simd: V, first: usize) -> Vectors<V> {
+        Vectors([self.corner(simd, 0, first), self.corner(simd, 1, first), self.corner(simd, 2, first)])
+    }
+
+    #[inline(always)]
+    fn corner<V: Simd>(&self, simd: V, k: usize, first: usize) -> [i32x16<V>; 3] {
+        let xy = self.xy[k][first..first + LANES].as_flattened();
+        let (one, two) = (i32x16::from_slice(simd, &xy[..LANES]), i32x16::from_slice(simd, &xy[LANES..]));
+        [one.unzip_low(two), one.unzip_high(two), row(simd, &self.z[k], first)]
+    }
+}
+
+/// Corners of up to `N` triangles in lattice steps, axis by axis: corner k's axis i is row `3 k + i`.
+struct Corners<const N: usize> {
+    rows: [[i32; N]; 9],
+}
+
+impl<const N: usize> Corners<N> {
+    const NONE: Self = Self { rows: [[0; N]; 9] };
 
     /// The corners of the [`LANES`] triangles from `first` on.
     #[inline(always)]
