@@ -13,7 +13,7 @@
 //! An edge that a projection shows as a point has only zeros. It passes whatever the voxel, and is given a reach that says
 //! so; the reach of any other is at least a step, `2^-15`, and thus as large as `64 u m` without help.
 
-use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
+use fearless_simd::{Simd, SimdFloat, f32x16, i32x16, prelude::*};
 
 use super::rule::SurfaceRule;
 
@@ -143,19 +143,19 @@ pub(super) fn layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
 }
 
 /// How near to rounding the tests have come.
-struct Tests<V: Simd> {
+pub(super) struct Tests<V: Simd> {
     edge_doubt: f32x16<V>,
     plane_doubt: f32x16<V>,
     /// The least by which a component of the normal has the sign it seems to have.
     normal: f32x16<V>,
     /// The least absolute values.
-    edge: f32x16<V>,
-    plane: f32x16<V>,
+    pub(super) edge: f32x16<V>,
+    pub(super) plane: f32x16<V>,
 }
 
 impl<V: Simd> Tests<V> {
     #[inline(always)]
-    fn new(simd: V, longest: f32x16<V>) -> Self {
+    pub(super) fn new(simd: V, longest: f32x16<V>) -> Self {
         let far = f32x16::splat(simd, f32::MAX);
         Self {
             edge_doubt: longest * EDGE_DOUBT,
@@ -167,14 +167,14 @@ impl<V: Simd> Tests<V> {
     }
 
     #[inline(always)]
-    fn doubtful(&self, simd: V) -> u64 {
+    pub(super) fn doubtful(&self, simd: V) -> u64 {
         let doubt = (self.edge - self.edge_doubt).min(self.plane - self.plane_doubt).min(self.normal);
         doubt.simd_lt(f32x16::splat(simd, 0.0)).to_bitmask()
     }
 
     /// The component of the normal across the axes i and j.
     #[inline(always)]
-    fn cross<const AXES: usize>(&mut self, e: &[[f32x16<V>; AXES]; 3], i: usize, j: usize) -> f32x16<V> {
+    pub(super) fn cross<const AXES: usize>(&mut self, e: &[[f32x16<V>; AXES]; 3], i: usize, j: usize) -> f32x16<V> {
         let (p, q) = (e[0][i] * e[1][j], e[0][j] * e[1][i]);
         let n = p - q;
         self.normal = self.normal.min(n.abs() - (p.abs() + q.abs()) * NORMAL_DOUBT);
@@ -263,7 +263,7 @@ const fn centre<const SIDE: usize>(i: usize) -> f32 {
 
 /// `b - a`.
 #[inline(always)]
-fn between<V: Simd, const AXES: usize>(a: [f32x16<V>; AXES], b: [f32x16<V>; AXES]) -> [f32x16<V>; AXES] {
+pub(super) fn between<V: Simd, F: SimdFloat<V>, const AXES: usize>(a: [F; AXES], b: [F; AXES]) -> [F; AXES] {
     let mut edge = b;
     for i in 0..AXES {
         edge[i] = b[i] - a[i];

@@ -5,7 +5,8 @@
 //!
 //! | box | path |
 //! |---|---|
-//! | at most four voxels along each axis | [`tiny`]: sixteen triangles at a time |
+//! | at most two voxels along each axis, where touching is enough | [`octants`](super::octants): sixteen triangles at a time |
+//! | at most four | [`tiny`]: sixteen triangles at a time |
 //! | the same, in mode solid | [`crossings`]: sixteen triangles at a time |
 //! | one voxel along two axes, where touching is enough | the box itself |
 //! | at most 64 voxels | [`rows`]: eight columns at a time |
@@ -69,6 +70,9 @@ struct Scratch {
 /// Lanes from which on it pays to look for triangles strictly inside a voxel or a row of two.
 const WORTH_BOXES: u32 = 4;
 
+/// Lanes from which on it pays to do triangles of at most two voxels along each axis without gathering more.
+const WORTH_OCTANTS: u32 = 9;
+
 /// Sends the voxels of a surface mode inside `clip` to `sink`.
 #[inline(always)]
 pub(super) fn surface<V: Simd, R: SurfaceRule>(
@@ -106,20 +110,24 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
                     tiny &= !settled;
                     simd.vectorize(
                         #[inline(always)]
-                        || tiny::send_boxes(&low, &extent, settled, &near, sink),
+                        || tiny::send_boxes(simd, &low, &extent, settled, &near, sink),
                     );
                 }
             }
-            let shortest = extent[0].min(extent[1]).min(extent[2]);
-            let flat = if R::TOUCH_IS_ENOUGH { shortest.simd_le(0).to_bitmask() & tiny } else { 0 };
             let two = at_most(2) & tiny;
-            if two & flat != 0 && waiting.flat_twos.push(simd, &corners, two & flat) {
-                simd.vectorize(
-                    #[inline(always)]
-                    || tiny::flush_flats::<_, _, 2>(simd, rule, &mut waiting.flat_twos, false, &near, sink),
-                );
-            }
-            if two & !flat != 0 && waiting.twos.push(simd, &corners, two & !flat) {
+            if R::TOUCH_IS_ENOUGH {
+                if two.count_ones() >= WORTH_OCTANTS {
+                    simd.vectorize(
+                        #[inline(always)]
+                        || tiny::send_octants(simd, &corners, two, &near, sink),
+                    );
+                } else if two != 0 && waiting.twos.push(simd, &corners, two) {
+                    simd.vectorize(
+                        #[inline(always)]
+                        || tiny::flush_octants(simd, &mut waiting.twos, false, &near, sink),
+                    );
+                }
+            } else if two != 0 && waiting.twos.push(simd, &corners, two) {
                 simd.vectorize(
                     #[inline(always)]
                     || tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, false, &near, sink),
@@ -127,23 +135,29 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
             }
             tiny &= !two;
             if tiny != 0 {
-                let flat = flat & tiny;
-                if flat != 0 && waiting.flat_fours.push(simd, &corners, flat) {
+                let three = at_most(3) & tiny;
+                let four = tiny & !three;
+                let shortest = extent[0].min(extent[1]).min(extent[2]);
+                let flat = if R::TOUCH_IS_ENOUGH { shortest.simd_le(0).to_bitmask() } else { 0 };
+                if three & flat != 0 && waiting.flat_threes.push(simd, &corners, three & flat) {
+                    simd.vectorize(
+                        #[inline(always)]
+                        || tiny::flush_flats::<_, _, 3>(simd, rule, &mut waiting.flat_threes, false, &near, sink),
+                    );
+                }
+                if four & flat != 0 && waiting.flat_fours.push(simd, &corners, four & flat) {
                     simd.vectorize(
                         #[inline(always)]
                         || tiny::flush_flats::<_, _, 4>(simd, rule, &mut waiting.flat_fours, false, &near, sink),
                     );
                 }
-                let rest = tiny & !flat;
-                let three = at_most(3) & rest;
-                if three != 0 && waiting.threes.push(simd, &corners, three) {
+                if three & !flat != 0 && waiting.threes.push(simd, &corners, three & !flat) {
                     simd.vectorize(
                         #[inline(always)]
                         || tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, false, &near, sink),
                     );
                 }
-                let four = rest & !three;
-                if four != 0 && waiting.fours.push(simd, &corners, four) {
+                if four & !flat != 0 && waiting.fours.push(simd, &corners, four & !flat) {
                     simd.vectorize(
                         #[inline(always)]
                         || tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, false, &near, sink),
@@ -155,11 +169,15 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
             }
         },
     );
-    tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, true, &near, sink);
+    if R::TOUCH_IS_ENOUGH {
+        tiny::flush_octants(simd, &mut waiting.twos, true, &near, sink);
+        tiny::flush_flats::<_, _, 3>(simd, rule, &mut waiting.flat_threes, true, &near, sink);
+        tiny::flush_flats::<_, _, 4>(simd, rule, &mut waiting.flat_fours, true, &near, sink);
+    } else {
+        tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, true, &near, sink);
+    }
     tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, true, &near, sink);
     tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, true, &near, sink);
-    tiny::flush_flats::<_, _, 2>(simd, rule, &mut waiting.flat_twos, true, &near, sink);
-    tiny::flush_flats::<_, _, 4>(simd, rule, &mut waiting.flat_fours, true, &near, sink);
 }
 
 /// [`surface`] for triangles that are not tiny.
@@ -262,7 +280,7 @@ impl<V: Simd> NearClip<V> {
 
     /// The lanes whose boxes meet the clip.
     #[inline(always)]
-    fn meets(&self, low: &[i32x16<V>; 3], high: &[i32x16<V>; 3]) -> u64 {
+    pub(super) fn meets(&self, low: &[i32x16<V>; 3], high: &[i32x16<V>; 3]) -> u64 {
         let mut meets = low[0].simd_le(self.high[0]) & high[0].simd_ge(self.low[0]);
         for i in 1..3 {
             meets = meets & low[i].simd_le(self.high[i]) & high[i].simd_ge(self.low[i]);
@@ -290,14 +308,14 @@ struct Waiting {
     threes: Queue,
     fours: Queue,
     /// At most as many voxels along two axes, and one along the third.
-    flat_twos: Queue,
+    flat_threes: Queue,
     flat_fours: Queue,
 }
 
 impl Waiting {
     fn new() -> Self {
         const NONE: Queue = Queue::EMPTY;
-        Self { twos: NONE, threes: NONE, fours: NONE, flat_twos: NONE, flat_fours: NONE }
+        Self { twos: NONE, threes: NONE, fours: NONE, flat_threes: NONE, flat_fours: NONE }
     }
 }
 

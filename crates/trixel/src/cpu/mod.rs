@@ -2,7 +2,8 @@
 //!
 //! - `kernel`: one triangle after the other, each to the path for its size
 //! - `tiny`, `crossings`, `rows`, `large`: the paths
-//! - `filter`: the tests of `tiny` in f32, and where they need to be repeated exactly
+//! - `octants`: the tests of `tiny` for the smallest
+//! - `filter`: its tests for all others in f32, and where they need to be repeated exactly
 //! - `instructions`: the vector instructions they are compiled for
 //! - `setup`: what paths compute first
 //! - `rule`: the modes as thresholds
@@ -21,6 +22,7 @@ mod instructions;
 mod kernel;
 mod large;
 pub(crate) mod number;
+mod octants;
 #[cfg(feature = "threads")]
 mod outbox;
 mod painter;

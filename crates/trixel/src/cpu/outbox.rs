@@ -2,8 +2,11 @@
 
 use std::ops::Range;
 
-use super::sink::{CubeSink, Places, Sink, Slab};
-use super::triangles::LANES;
+use fearless_simd::{Simd, i32x16};
+
+use super::filter::Voxels;
+use super::sink::{CubeSink, Places, Sink, Slab, Steps, bits_of, set_columns, set_cube};
+use super::triangles::{LANES, Lanes};
 use crate::volume::WORD_BITS;
 
 /// Where slabs begin and end along x.
@@ -121,16 +124,19 @@ impl<'a> Outbox<'a> {
 
     /// Sets the voxels left to a slab.
     pub(super) fn set(&self, slab: usize, into: &mut Slab<'_>) {
+        // What is behind a reference to a slab would be loaded again after each word.
+        let steps = into.steps();
+        let words = &mut *into.words;
         for &entry in &self.slabs[slab].small {
             let (word, shift) = self.unpack(entry >> SMALL_BITS);
-            into.paint_cube::<2>(word, entry & ((1 << SMALL_BITS) - 1), shift);
+            paint_cube::<2>(words, steps, word, entry & ((1 << SMALL_BITS) - 1), shift);
         }
         for &[bits, entry] in &self.slabs[slab].cubes {
             let (word, shift) = self.unpack(entry >> 1);
             if entry & 1 == 0 {
-                into.paint_cube::<3>(word, bits, shift);
+                paint_cube::<3>(words, steps, word, bits, shift);
             } else {
-                into.paint_cube::<4>(word, bits, shift);
+                paint_cube::<4>(words, steps, word, bits, shift);
             }
         }
     }
@@ -218,19 +224,31 @@ impl Sink for Outbox<'_> {
     }
 }
 
+#[inline(always)]
+fn paint_cube<const SIDE: usize>(words: &mut [u64], steps: Steps, first: isize, bits: u64, shift: u32) {
+    if !set_cube::<SIDE>(words, steps, first, bits, shift) {
+        set_columns::<SIDE>(words, steps, first, bits, shift);
+    }
+}
+
 impl CubeSink for Outbox<'_> {
     #[inline(always)]
-    fn places(&self, low: &[[i32; LANES]; 3], base: [i64; 3]) -> Places {
+    fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> Places {
         Places::new(low, base, [0; 3], self.cuts.columns, self.cuts.column_words)
     }
 
     #[inline(always)]
     #[expect(clippy::cast_possible_wrap, reason = "at most 4")]
-    fn cube<const SIDE: usize>(&mut self, places: &Places, lane: usize, bits: u64) {
-        let (x, word, shift) = (places.x[lane], places.word[lane], places.shift[lane]);
-        match (self.cuts.of(x), self.cuts.of(x + SIDE as i64 - 1)) {
-            (Some(slab), Some(last)) if slab == last => self.push::<SIDE>(slab, word, bits, shift),
-            _ => self.push_layers::<SIDE>(x, word, bits, shift),
+    fn cubes<V: Simd, const SIDE: usize>(&mut self, places: &Places, voxels: &Voxels<V>, mut lanes: Lanes) {
+        let bits = [*voxels[0], *voxels[1]];
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            let (x, (word, shift), bits) = (i64::from(places.x[lane]), places.of(lane), bits_of::<SIDE>(&bits, lane));
+            match (self.cuts.of(x), self.cuts.of(x + SIDE as i64 - 1)) {
+                (Some(slab), Some(last)) if slab == last => self.push::<SIDE>(slab, word, bits, shift),
+                _ => self.push_layers::<SIDE>(x, word, bits, shift),
+            }
+            lanes &= lanes - 1;
         }
     }
 }

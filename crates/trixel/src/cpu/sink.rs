@@ -1,7 +1,10 @@
 //! Where the kernel's runs go: bits of a slab of columns.
 
+use fearless_simd::{Simd, i32x16, prelude::*};
+
+use super::filter::Voxels;
 use super::rows::Tile;
-use super::triangles::LANES;
+use super::triangles::{LANES, Lanes};
 use crate::volume::WORD_BITS;
 
 /// Words of a column by shifting.
@@ -32,49 +35,65 @@ pub(super) trait Sink {
 
 /// Receives cubes of voxels too, several at once.
 pub(super) trait CubeSink: Sink {
-    /// Looks up cubes whose low corners, a row for each axis, are seen from the voxel `base`; along z, they are inside the
-    /// clip.
-    fn places(&self, low: &[[i32; LANES]; 3], base: [i64; 3]) -> Places;
+    /// Looks up cubes whose low corners are seen from the voxel `base`, and inside the clip along z: long before they are
+    /// sent, because vectors take their time to be read lane by lane.
+    fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> Places;
 
-    /// Voxels of the cube of `SIDE` in a lane: those `(x, y, z)` from its low corner whose bit `(SIDE x + y) SIDE + z` is
-    /// set. The set ones are inside the clip.
-    fn cube<const SIDE: usize>(&mut self, places: &Places, lane: usize, bits: u64);
+    /// Voxels of cubes of `SIDE` in `lanes`: those `(x, y, z)` from the corner whose bit `(SIDE x + y) SIDE + z` is set, all
+    /// inside the clip.
+    fn cubes<V: Simd, const SIDE: usize>(&mut self, places: &Places, voxels: &Voxels<V>, lanes: Lanes);
 }
 
 /// Where the low corners of cubes are: along x, and among a piece's words.
 pub(super) struct Places {
-    pub(super) x: [i64; LANES],
+    #[cfg(feature = "threads")]
+    pub(super) x: [i32; LANES],
     /// Outside the piece: past its end, below 0, or a word for which no bit will be set.
-    pub(super) word: [isize; LANES],
-    pub(super) shift: [u32; LANES],
+    words: [[i64; LANES / 2]; 2],
+    shifts: [i32; LANES],
 }
 
 impl Places {
-    /// In a piece that starts at a voxel, for its columns along y and the words of a column.
+    /// Corners seen from `base`, in a piece that starts at a voxel, for its columns along y and the words of a column.
     #[inline(always)]
     #[expect(
         clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
         clippy::cast_possible_wrap,
-        reason = "within the piece or a few voxels beside it"
+        reason = "all in or near a grid, of at most 2^15 voxels along an axis"
     )]
-    pub(super) fn new(
-        low: &[[i32; LANES]; 3],
+    pub(super) fn new<V: Simd>(
+        low: &[i32x16<V>; 3],
         base: [i64; 3],
         start: [i64; 3],
         columns: usize,
         column_words: usize,
     ) -> Self {
-        let mut places = Self { x: [0; LANES], word: [0; LANES], shift: [0; LANES] };
-        for lane in 0..LANES {
-            let at = |i: usize| i64::from(low[i][lane]) + (base[i] - start[i]);
-            let z = at(2);
-            places.x[lane] = at(0);
-            places.word[lane] = ((at(0) * columns as i64 + at(1)) * column_words as i64 + (z >> WORD_SHIFT)) as isize;
-            places.shift[lane] = z as u32 % WORD_BITS;
+        let move_by = |i: usize| (base[i] - start[i]) as i32;
+        let at = [low[0] + move_by(0), low[1] + move_by(1), low[2] + move_by(2)];
+        let column = at[0] * columns as i32 + at[1];
+        let (first, second) = column.widening_mul(column_words as i32);
+        let (above_first, above_second) = (at[2] >> WORD_SHIFT).widen();
+        Self {
+            #[cfg(feature = "threads")]
+            x: *at[0],
+            words: [*(first + above_first), *(second + above_second)],
+            shifts: *(at[2] & (WORD_BITS as i32 - 1)),
         }
-        places
     }
+
+    /// The word and the shift of a lane.
+    #[inline(always)]
+    #[expect(clippy::cast_sign_loss, clippy::cast_possible_truncation, reason = "of a word")]
+    pub(super) fn of(&self, lane: usize) -> (isize, u32) {
+        (self.words.as_flattened()[lane % LANES] as isize, self.shifts[lane % LANES] as u32)
+    }
+}
+
+/// Bits of the cube of a lane.
+#[inline(always)]
+pub(super) fn bits_of<const SIDE: usize>(words: &[[i32; LANES]; 2], lane: usize) -> u64 {
+    let word = |i: usize| u64::from(words[i][lane % LANES].cast_unsigned());
+    if SIDE < 4 { word(0) } else { word(0) | word(1) << 32 }
 }
 
 /// The words of a piece of the grid: what one thread owns.
@@ -85,6 +104,13 @@ pub(super) struct Slab<'a> {
     /// Columns along y.
     pub(super) columns: usize,
     pub(super) column_words: usize,
+}
+
+/// Words from a column to the next along x, and along y.
+#[derive(Clone, Copy)]
+pub(super) struct Steps {
+    layer: u32,
+    beside: u32,
 }
 
 impl<'a> Slab<'a> {
@@ -100,60 +126,69 @@ impl<'a> Slab<'a> {
     }
 
     #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "at most 2^15 columns of 2^9 words")]
+    pub(super) fn steps(&self) -> Steps {
+        Steps { layer: self.layer() as u32, beside: self.column_words as u32 }
+    }
+
+    #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
     fn column(&mut self, x: i64, y: i64) -> &mut [u64] {
         let [x, y] = [(x - self.start[0]) as usize, (y - self.start[1]) as usize];
         let start = (x * self.columns + y) * self.column_words;
         &mut self.words[start..start + self.column_words]
     }
+}
 
-    /// Sets the voxels of a cube whose columns' bits are in the words from `first` on: all columns without asking which
-    /// have any, as that guess is wrong too often. `false`, and nothing done, where not all are in the slab.
-    #[inline(always)]
-    #[expect(clippy::cast_sign_loss, reason = "too large, then")]
-    fn set_cube<const SIDE: usize>(&mut self, first: isize, bits: u64, shift: u32) -> bool {
-        let (beside, layer) = (self.column_words, self.layer());
-        let last = (SIDE - 1) * (layer + beside);
-        // At the end of a row, the column beside is the first of the next: its bits are 0 then.
-        let Some(words) = self.words.get_mut(first as usize..).filter(|words| words.len() > last) else {
-            return false;
-        };
-        for x in 0..SIDE {
-            for y in 0..SIDE {
-                let run = bits >> ((SIDE * x + y) * SIDE) & ((1 << SIDE) - 1);
-                words[x * layer + y * beside] |= run << shift;
-            }
-        }
-        true
+/// Sets the voxels of a cube whose columns' bits are in the words from `first` on, and `steps` further along x and y: of all
+/// columns without asking which have any, as that guess is wrong too often. `false`, and nothing done, where a column needs
+/// two words, or some would not be among the words: then it is for [`set_columns`].
+#[inline(always)]
+#[expect(clippy::cast_sign_loss, reason = "too large, then")]
+pub(super) fn set_cube<const SIDE: usize>(
+    words: &mut [u64],
+    steps: Steps,
+    first: isize,
+    bits: u64,
+    shift: u32,
+) -> bool {
+    if shift > WORD_BITS - side::<SIDE>() {
+        return false;
     }
-
-    /// Sets the voxels of a cube whose columns' bits are in the words from `first` on, which may lie outside the slab as
-    /// long as its voxels do not.
-    #[inline(always)]
-    pub(super) fn paint_cube<const SIDE: usize>(&mut self, first: isize, bits: u64, shift: u32) {
-        if shift > WORD_BITS - side::<SIDE>() || !self.set_cube::<SIDE>(first, bits, shift) {
-            self.set_columns::<SIDE>(first, bits, shift);
+    // Of numbers known to be small, the compiler sees that no word is past the last.
+    let (layer, beside) = (steps.layer as usize, steps.beside as usize);
+    let last = (SIDE - 1) * (layer + beside);
+    // At the end of a row, the column beside is the first of the next: its bits are 0 then.
+    let Some(words) = words.get_mut(first as usize..) else { return false };
+    if words.len() <= last {
+        return false;
+    }
+    for x in 0..SIDE {
+        for y in 0..SIDE {
+            let run = bits >> ((SIDE * x + y) * SIDE) & ((1 << SIDE) - 1);
+            words[x * layer + y * beside] |= run << shift;
         }
     }
+    true
+}
 
-    /// [`Self::paint_cube`], column by column.
-    #[cold]
-    #[inline(never)]
-    #[expect(clippy::cast_sign_loss, reason = "voxels are inside the slab")]
-    fn set_columns<const SIDE: usize>(&mut self, first: isize, mut bits: u64, shift: u32) {
-        let side = side::<SIDE>();
-        while bits != 0 {
-            let column = bits.trailing_zeros() / side;
-            let run = bits >> (column * side) & ((1 << side) - 1);
-            bits ^= run << (column * side);
-            let (x, y) = ((column / side) as usize, (column % side) as usize);
-            let word = first.wrapping_add_unsigned(x * self.layer() + y * self.column_words) as usize;
-            self.words[word] |= run << shift;
-            if shift > WORD_BITS - side {
-                let above = run >> (WORD_BITS - shift);
-                if above != 0 {
-                    self.words[word + 1] |= above;
-                }
+/// [`set_cube`] column by column; those without voxels may lie outside the words.
+#[cold]
+#[inline(never)]
+#[expect(clippy::cast_sign_loss, reason = "voxels are inside the slab")]
+pub(super) fn set_columns<const SIDE: usize>(words: &mut [u64], steps: Steps, first: isize, mut bits: u64, shift: u32) {
+    let side = side::<SIDE>();
+    while bits != 0 {
+        let column = bits.trailing_zeros() / side;
+        let run = bits >> (column * side) & ((1 << side) - 1);
+        bits ^= run << (column * side);
+        let (x, y) = ((column / side) as usize, (column % side) as usize);
+        let word = first.wrapping_add_unsigned(x * steps.layer as usize + y * steps.beside as usize) as usize;
+        words[word] |= run << shift;
+        if shift > WORD_BITS - side {
+            let above = run >> (WORD_BITS - shift);
+            if above != 0 {
+                words[word + 1] |= above;
             }
         }
     }
@@ -229,13 +264,32 @@ fn for_each_column(mut columns: u64, mut each: impl FnMut(usize)) {
 
 impl CubeSink for SetRuns<'_> {
     #[inline(always)]
-    fn places(&self, low: &[[i32; LANES]; 3], base: [i64; 3]) -> Places {
+    fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> Places {
         Places::new(low, base, self.0.start, self.0.columns, self.0.column_words)
     }
 
     #[inline(always)]
-    fn cube<const SIDE: usize>(&mut self, places: &Places, lane: usize, bits: u64) {
-        self.0.paint_cube::<SIDE>(places.word[lane], bits, places.shift[lane]);
+    fn cubes<V: Simd, const SIDE: usize>(&mut self, places: &Places, voxels: &Voxels<V>, mut lanes: Lanes) {
+        // What is behind a reference to a slab would be loaded again after each word.
+        let steps = self.0.steps();
+        let words = &mut *self.0.words;
+        let bits = [*voxels[0], *voxels[1]];
+        // Those that need a call, kept out of the loop.
+        let mut left = 0u64;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            let (first, shift) = places.of(lane);
+            if !set_cube::<SIDE>(words, steps, first, bits_of::<SIDE>(&bits, lane), shift) {
+                left |= 1 << lane;
+            }
+            lanes &= lanes - 1;
+        }
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            let (first, shift) = places.of(lane);
+            set_columns::<SIDE>(words, steps, first, bits_of::<SIDE>(&bits, lane), shift);
+            left &= left - 1;
+        }
     }
 }
 

@@ -8,9 +8,10 @@ use fearless_simd::{Simd, f32x16, f64x8, i32x16, i64x8, mask32x16, prelude::*};
 
 use super::filter::{self, Cube, Filtered, Voxels};
 use super::kernel::NearClip;
+use super::octants;
 use super::rule::SurfaceRule;
-use super::sink::{CubeSink, Places};
-use super::triangles::{LANES, Queue, Vectors};
+use super::sink::CubeSink;
+use super::triangles::{LANES, Lanes, Queue, Vectors};
 use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
 
 /// Lanes of a vector of f64.
@@ -45,13 +46,15 @@ impl<V: Simd> Boxes<V> {
         Self { low, extent, longest }
     }
 
+    /// The lanes that have voxels inside the clip in each layer of cubes of 2^3.
     #[inline(always)]
-    fn places(&self, clip: &NearClip<V>, sink: &impl CubeSink) -> Places {
-        let mut low = [[0; LANES]; 3];
-        for i in 0..3 {
-            self.low[i].store_slice(&mut low[i]);
+    fn layers(&self, clip: &NearClip<V>) -> octants::Layers {
+        let mut layers = [[0; 2]; 3];
+        for axis in 0..3 {
+            let last = self.extent[axis].min(clip.high[axis] - self.low[axis]);
+            layers[axis] = [self.low[axis].simd_ge(clip.low[axis]).to_bitmask(), last.simd_ge(1).to_bitmask()];
         }
-        sink.places(&low, clip.base)
+        layers
     }
 
     /// Drops the voxels of cubes of `SIDE` that are outside the boxes or the clip.
@@ -77,27 +80,17 @@ impl<V: Simd> Boxes<V> {
 /// Sends the boxes of the lanes in `mask`, which are a voxel or a row of two.
 #[inline(always)]
 pub(super) fn send_boxes<V: Simd>(
+    simd: V,
     low: &[i32x16<V>; 3],
     extent: &[i32x16<V>; 3],
-    mask: u64,
+    mask: Lanes,
     clip: &NearClip<V>,
     sink: &mut impl CubeSink,
 ) {
-    const SIDE: usize = 2;
-    let mut corners = [[0; LANES]; 3];
-    for i in 0..3 {
-        low[i].store_slice(&mut corners[i]);
-    }
-    let places = sink.places(&corners, clip.base);
-    let mut bits = [0; LANES];
     // The other end of the row is the cube's voxel 4, 2 or 1.
-    (extent[0] << 4 | extent[1] << 2 | extent[2] << 1 | 1).store_slice(&mut bits);
-    let mut left = mask;
-    while left != 0 {
-        let lane = left.trailing_zeros() as usize % LANES;
-        sink.cube::<SIDE>(&places, lane, u64::from(bits[lane].cast_unsigned()));
-        left &= left - 1;
-    }
+    let voxels = extent[0] << 4 | extent[1] << 2 | extent[2] << 1 | 1;
+    let places = sink.places(low, clip.base);
+    sink.cubes::<_, 2>(&places, &[voxels, i32x16::splat(simd, 0)], mask);
 }
 
 /// Sends the voxels of the waiting triangles, whose boxes have at most `SIDE` voxels along each axis: of as many as fill
@@ -136,7 +129,7 @@ fn cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
 ) {
     let corners = waiting.vectors(simd, first);
     let boxes = Boxes::new(simd, &corners);
-    let places = boxes.places(clip, sink);
+    let places = sink.places(&boxes.low, clip.base);
     let middle = half_voxels(&boxes.low, SIDE);
     let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
     let Filtered { mut voxels, doubtful } =
@@ -145,7 +138,46 @@ fn cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
         voxels = exact_cubes::<_, _, SIDE>(simd, rule, waiting, first);
     }
     boxes.keep::<SIDE>(simd, clip, &mut voxels);
-    send::<_, SIDE>(&voxels, count, &places, sink);
+    sink.cubes::<_, SIDE>(&places, &voxels, used(count));
+}
+
+/// Sends the voxels of the triangles in `lanes`, whose boxes have at most two voxels along each axis.
+#[inline(always)]
+pub(super) fn send_octants<V: Simd>(
+    simd: V,
+    corners: &Vectors<V>,
+    lanes: Lanes,
+    clip: &NearClip<V>,
+    sink: &mut impl CubeSink,
+) {
+    const SIDE: usize = 2;
+    let boxes = Boxes::new(simd, corners);
+    let places = sink.places(&boxes.low, clip.base);
+    let middle = half_voxels(&boxes.low, SIDE);
+    let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
+    let voxels = octants::voxels(simd, corners, middle, longest, PER_HALF, boxes.layers(clip), lanes);
+    sink.cubes::<_, SIDE>(&places, &[voxels, i32x16::splat(simd, 0)], lanes);
+}
+
+/// [`send_octants`] of the waiting triangles: of as many as fill vectors, or of all.
+#[inline(always)]
+pub(super) fn flush_octants<V: Simd>(
+    simd: V,
+    waiting: &mut Queue,
+    all: bool,
+    clip: &NearClip<V>,
+    sink: &mut impl CubeSink,
+) {
+    let mut first = 0;
+    loop {
+        let count = waiting.lanes(first, all);
+        if count == 0 {
+            break;
+        }
+        send_octants(simd, &waiting.vectors(simd, first), used(count), clip, sink);
+        first += LANES;
+    }
+    waiting.keep(simd, first);
 }
 
 /// [`flush`] for boxes of one voxel along some axis: strictly inside their layer, triangles meet a voxel where their
@@ -184,7 +216,7 @@ fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
 ) {
     let corners = waiting.vectors(simd, first);
     let boxes = Boxes::new(simd, &corners);
-    let places = boxes.places(clip, sink);
+    let places = sink.places(&boxes.low, clip.base);
     // The axes (a, b) of the layer, ascending; of a row of voxels, one of its two layers.
     let along_x = boxes.extent[0].simd_le(0);
     let along_z = boxes.extent[2].simd_le(0) & !along_x;
@@ -202,25 +234,13 @@ fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     let Filtered { mut voxels, doubtful } = filter::layers::<_, _, SIDE>(simd, rule, &layer, longest);
     if doubtful & used(count) != 0 {
         voxels = exact_cubes::<_, _, SIDE>(simd, rule, waiting, first);
-    } else if SIDE == 2 {
-        voxels[0] = spread_two(voxels[0], along_x, along_z);
+    } else if SIDE == 3 {
+        voxels[0] = spread_three(voxels[0], along_x, along_z);
     } else {
-        let mut cells = [0; LANES];
-        voxels[0].store_slice(&mut cells);
-        let (along_x, along_z) = (along_x.to_bitmask(), along_z.to_bitmask());
-        let mut words = [[0; LANES]; 2];
-        for lane in 0..LANES {
-            let cube = spread_four(cells[lane], along_x >> lane & 1 != 0, along_z >> lane & 1 != 0);
-            #[expect(clippy::cast_possible_truncation, reason = "the halves")]
-            {
-                words[0][lane] = cube as i32;
-                words[1][lane] = (cube >> 32) as i32;
-            }
-        }
-        voxels = [i32x16::from_slice(simd, &words[0]), i32x16::from_slice(simd, &words[1])];
+        voxels = spread_four(simd, voxels[0], along_x, along_z);
     }
     boxes.keep::<SIDE>(simd, clip, &mut voxels);
-    send::<_, SIDE>(&voxels, count, &places, sink);
+    sink.cubes::<_, SIDE>(&places, &voxels, used(count));
 }
 
 /// The lattice points at the middle of cubes of `side` voxels.
@@ -233,49 +253,44 @@ fn half_voxels<V: Simd>(low: &[i32x16<V>; 3], side: usize) -> [i32x16<V>; 3] {
 
 /// The first `count` lanes.
 #[inline(always)]
-fn used(count: usize) -> u64 {
+fn used(count: usize) -> Lanes {
     (1 << count) - 1
 }
 
-/// Bit `2 a + b` of a layer of 2 x 2 voxels to the bit of its voxel in a cube: a layer across x if `along_x`, across z if
+/// Bit `3 a + b` of a layer of 3 x 3 voxels to the bit of its voxel in a cube: a layer across x if `along_x`, across z if
 /// `along_z`, or else across y.
 #[inline(always)]
-fn spread_two<V: Simd>(cells: i32x16<V>, along_x: mask32x16<V>, along_z: mask32x16<V>) -> i32x16<V> {
-    // Each row's two bits to every fourth, each bit to every other.
-    let rows = (cells | cells << 2) & 0b0011_0011;
-    let bits = (rows | rows << 1) & 0b0101_0101;
+fn spread_three<V: Simd>(cells: i32x16<V>, along_x: mask32x16<V>, along_z: mask32x16<V>) -> i32x16<V> {
+    // Each row's three bits to every ninth, each bit to every third.
+    let rows = cells & 0o7 | (cells & 0o70) << 6 | (cells & 0o700) << 12;
+    let bits = rows & 0o001_001_001 | (rows & 0o002_002_002) << 2 | (rows & 0o004_004_004) << 4;
     along_x.select(cells, along_z.select(bits, rows))
 }
 
-/// [`spread_two`] for a layer of 4 x 4.
+/// [`spread_three`] for a layer of 4 x 4.
 #[inline(always)]
-fn spread_four(cells: i32, along_x: bool, along_z: bool) -> u64 {
-    // Each row's four bits to every 16th, each bit to every fourth.
-    let row = u64::from(cells.cast_unsigned());
-    let rows = (row | row << 24) & 0x0000_00ff_0000_00ff;
-    let rows = (rows | rows << 12) & 0x000f_000f_000f_000f;
-    let bits = (rows | rows << 6) & 0x0303_0303_0303_0303;
-    let bits = (bits | bits << 3) & 0x1111_1111_1111_1111;
-    if along_x {
-        row
-    } else if along_z {
-        bits
-    } else {
-        rows
+fn spread_four<V: Simd>(simd: V, cells: i32x16<V>, along_x: mask32x16<V>, along_z: mask32x16<V>) -> Voxels<V> {
+    let (along_x, along_z) = (along_x.to_bitmask(), along_z.to_bitmask());
+    let mut words = [[0; LANES]; 2];
+    for lane in 0..LANES {
+        // Each row's four bits to every 16th, each bit to every fourth.
+        let row = u64::from(cells[lane].cast_unsigned());
+        let rows = (row | row << 24) & 0x0000_00ff_0000_00ff;
+        let rows = (rows | rows << 12) & 0x000f_000f_000f_000f;
+        let bits = (rows | rows << 6) & 0x0303_0303_0303_0303;
+        let bits = (bits | bits << 3) & 0x1111_1111_1111_1111;
+        let cube = match (along_x >> lane & 1, along_z >> lane & 1) {
+            (1, _) => row,
+            (_, 1) => bits,
+            _ => rows,
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "the halves")]
+        {
+            words[0][lane] = cube as i32;
+            words[1][lane] = (cube >> 32) as i32;
+        }
     }
-}
-
-/// Sends the voxels of the first `count` lanes.
-#[inline(always)]
-fn send<V: Simd, const SIDE: usize>(voxels: &Voxels<V>, count: usize, places: &Places, sink: &mut impl CubeSink) {
-    let mut bits = [[0; LANES]; 2];
-    for word in 0..Cube::<SIDE>::WORDS {
-        voxels[word].store_slice(&mut bits[word]);
-    }
-    for lane in 0..count.min(LANES) {
-        let [low, high] = [bits[0][lane], bits[1][lane]].map(|word| u64::from(word.cast_unsigned()));
-        sink.cube::<SIDE>(places, lane, low | high << 32);
-    }
+    [i32x16::from_slice(simd, &words[0]), i32x16::from_slice(simd, &words[1])]
 }
 
 /// The voxels of cubes of `SIDE`, without rounding.
@@ -408,47 +423,117 @@ mod tests {
 
     const ROUNDS: u32 = 500;
 
+    /// Triangles whose boxes are inside a cube of `side` voxels at the origin: corner, axis, lane.
+    fn in_cube(random: &mut Random, round: u32, side: i64) -> [[[i32; LANES]; 3]; 3] {
+        let placement = Placement::ALL[round as usize % Placement::ALL.len()];
+        let mut rows = [[[0; LANES]; 3]; 3];
+        for lane in 0..LANES {
+            let extent = random.range(1, side - 1);
+            let corners = triangle(random, placement, 0, side - 1 - extent, extent);
+            for (k, i) in (0..9).map(|at| (at / 3, at % 3)) {
+                // A box of the cube's voxels and no more.
+                let most = side * i64::from(STEPS_PER_VOXEL) - 1;
+                rows[k][i][lane] = i32::try_from(corners[k][i].clamp(1, most)).unwrap();
+            }
+        }
+        rows
+    }
+
+    fn vectors<V: Simd>(simd: V, rows: &[[[i32; LANES]; 3]; 3]) -> Vectors<V> {
+        Vectors(rows.map(|corner| corner.map(|row| i32x16::from_slice(simd, &row))))
+    }
+
+    /// The voxels of each lane.
+    fn by_lane<V: Simd>(voxels: &Voxels<V>) -> [u64; LANES] {
+        let word = |i: usize, lane: usize| u64::from(voxels[i][lane].cast_unsigned());
+        std::array::from_fn(|lane| word(0, lane) | word(1, lane) << 32)
+    }
+
     /// The share of triangles that the filter decides, all of them as the exact tests do.
     fn decided<V: Simd, R: SurfaceRule, const SIDE: usize>(simd: V, rule: &R) -> f64 {
         let mut random = Random::new(SIDE as u64);
-        let side = i64::try_from(SIDE).unwrap();
         let mut decided = 0;
         for round in 0..ROUNDS {
-            let placement = Placement::ALL[round as usize % Placement::ALL.len()];
-            let mut rows = [[[0; LANES]; 3]; 3];
-            for lane in 0..LANES {
-                let extent = random.range(1, side - 1);
-                let corners = triangle(&mut random, placement, 0, side - 1 - extent, extent);
-                for (k, i) in (0..9).map(|at| (at / 3, at % 3)) {
-                    // A box of the cube's voxels and no more.
-                    let most = side * i64::from(STEPS_PER_VOXEL) - 1;
-                    rows[k][i][lane] = i32::try_from(corners[k][i].clamp(1, most)).unwrap();
-                }
-            }
-            let corners = Vectors(rows.map(|corner| corner.map(|row| i32x16::from_slice(simd, &row))));
+            let rows = in_cube(&mut random, round, i64::try_from(SIDE).unwrap());
+            let corners = vectors(simd, &rows);
             let longest = Boxes::new(simd, &corners).longest.to_float::<f32x16<V>>() * PER_HALF;
             let low = [i32x16::splat(simd, 0); 3];
             let filtered =
                 filter::cubes::<_, _, SIDE>(simd, rule, &corners.floats(half_voxels(&low, SIDE), PER_HALF), longest);
-            let mut bits = [[0; LANES]; 2];
-            for (bits, voxels) in bits.iter_mut().zip(&filtered.voxels) {
-                voxels.store_slice(bits);
-            }
+            let voxels = by_lane(&filtered.voxels);
             for (half, corners) in corners.halves(simd, low, 1.0).iter().enumerate() {
                 let mut exact_bits = [0; HALF];
                 exact::<_, _, SIDE>(simd, rule, corners).store_slice(&mut exact_bits);
-                for (i, exact) in exact_bits.into_iter().enumerate() {
-                    let lane = HALF * half + i;
+                for (lane, exact) in (HALF * half..).zip(exact_bits) {
                     if filtered.doubtful >> lane & 1 == 0 {
-                        let [low, high] = [bits[0][lane], bits[1][lane]].map(|word| u64::from(word.cast_unsigned()));
                         let corners = rows.map(|corner| corner.map(|row| row[lane]));
-                        assert_eq!(low | high << 32, exact.cast_unsigned(), "side {SIDE}, {placement:?}, {corners:?}");
+                        assert_eq!(voxels[lane], exact.cast_unsigned(), "side {SIDE}, round {round}, {corners:?}");
                         decided += 1;
                     }
                 }
             }
         }
         f64::from(decided) / f64::from(ROUNDS * u32::try_from(LANES).unwrap())
+    }
+
+    /// `(c, d)` with `a d - b c = 1`, for `a` and `b` without a common divisor, no larger than they are.
+    fn beside(a: i64, b: i64) -> [i64; 2] {
+        if b == 0 {
+            return [0, 1];
+        }
+        let [c, d] = beside(b, a % b);
+        [-d - a / b * c, -c]
+    }
+
+    /// In a projection, moves the first edge of each triangle as near to the middle of the cube as the lattice allows: there,
+    /// floats do not tell on which side it is.
+    fn through_middle(random: &mut Random, rows: &mut [[[i32; LANES]; 3]; 3]) {
+        let (i, j) = [(0, 1), (1, 2), (2, 0)][usize::try_from(random.range(0, 2)).unwrap()];
+        for lane in 0..LANES {
+            let [a, b] = [random.range(1, 60_000), random.range(1, 60_000)];
+            let [c, d] = beside(a, b);
+            if a * d - b * c == 1 {
+                let at = |from_middle: i64| i32::try_from(i64::from(STEPS_PER_VOXEL) + from_middle).unwrap();
+                (rows[0][i][lane], rows[0][j][lane]) = (at(a), at(b));
+                (rows[1][i][lane], rows[1][j][lane]) = (at(-c), at(-d));
+            }
+        }
+    }
+
+    /// Octants give the voxels of boxes that the exact tests do, in clips that cut some.
+    fn octants_are_exact<V: Simd>(simd: V) {
+        let mut random = Random::new(8);
+        for round in 0..2 * ROUNDS {
+            let mut rows = in_cube(&mut random, round, 2);
+            if round % 2 == 0 {
+                through_middle(&mut random, &mut rows);
+            }
+            let corners = vectors(simd, &rows);
+            let boxes = Boxes::new(simd, &corners);
+            let mut clip = || i32x16::splat(simd, i32::try_from(random.range(0, 1)).unwrap());
+            let (zero, one) = (i32x16::splat(simd, 0), i32x16::splat(simd, 1));
+            let clip = NearClip { base: [0; 3], low: [clip(), zero, zero], high: [one, clip(), one] };
+            let mut queue = Queue::EMPTY;
+            queue.push(simd, &corners, used(LANES));
+            let mut expected = exact_cubes::<_, _, 2>(simd, &Conservative, &queue, 0);
+            boxes.keep::<2>(simd, &clip, &mut expected);
+
+            let (middle, layers) = (half_voxels(&boxes.low, 2), boxes.layers(&clip));
+            let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
+            let exact = octants::exact(simd, &corners, middle, layers);
+            let meets = clip.meets(&boxes.low, &[0, 1, 2].map(|i| boxes.low[i] + boxes.extent[i]));
+            for lane in (0..LANES).filter(|lane| meets >> lane & 1 != 0) {
+                let corners_of = rows.map(|corner| corner.map(|row| row[lane]));
+                // Alone, so that the others' doubts do not matter.
+                let alone = octants::voxels(simd, &corners, middle, longest, PER_HALF, layers, 1 << lane);
+                assert_eq!([exact[lane], alone[lane]], [expected[0][lane]; 2], "round {round}, {corners_of:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn octants_give_what_the_exact_tests_do() {
+        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => octants_are_exact(simd));
     }
 
     #[test]

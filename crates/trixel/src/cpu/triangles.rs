@@ -10,6 +10,9 @@ use crate::lattice::{LatticeMesh, LatticePositions, STEP_BITS};
 /// Triangles that are judged together: lanes of a vector of `i32`.
 pub(super) const LANES: usize = 16;
 
+/// The lanes, of a vector's, in which something holds.
+pub(super) type Lanes = u64;
+
 /// Triangles that are loaded together. Several vectors' worth, because a vector can only be read back some time after its
 /// parts were written.
 pub(super) const BLOCK: usize = 64;
