@@ -11,9 +11,10 @@
 //! without area has no inside, and either side may be taken: its edges go to and fro, and whatever is strictly beside
 //! them, is outside.
 //!
-//! The signs are first taken in f32, with the unit, origin and bounds of [`filter`]. Where rounding may have changed
-//! one, they are taken in f64 from lattice steps, which is exact: corners are within 2^16 steps of the middle, edges and
-//! products below 2^17 and 2^33, normals below 2^35, and the three products of the plane's term below 2^52.
+//! The signs are first taken in f32, with the unit, origin and bounds of [`filter`](super::filter). Where rounding may have
+//! changed one, they are taken in f64 from lattice steps, which is exact: corners are within 2^16 steps of the middle,
+//! edges and products below 2^17 and 2^33, normals below 2^35, and the three products of the plane's term below 2^52. Only
+//! there are edges through the middle told from those beside it: in f32 they are in doubt.
 
 use fearless_simd::{Simd, SimdFloat, f32x16, i32x16, mask32x16, prelude::*};
 
@@ -53,7 +54,7 @@ pub(super) fn voxels<V: Simd>(
         let corners = *corners;
         return exact(simd, &corners, middle, layers);
     }
-    select(simd, signs.met(layers))
+    select(simd, signs.met::<_, false>(layers))
 }
 
 /// [`voxels`] without rounding.
@@ -66,7 +67,7 @@ pub(super) fn exact<V: Simd>(simd: V, corners: &Vectors<V>, middle: [i32x16<V>; 
         || {
             let mut both = [0; 8];
             for (half, v) in corners.halves(simd, middle, 1.0).iter().enumerate() {
-                let met = Signs::new(v).met(layers.map(|axis| axis.map(|lanes| lanes >> (half * HALF))));
+                let met = Signs::new(v).met::<_, true>(layers.map(|axis| axis.map(|lanes| lanes >> (half * HALF))));
                 for (both, met) in both.iter_mut().zip(met) {
                     *both |= (met & ((1 << HALF) - 1)) << (half * HALF);
                 }
@@ -120,9 +121,9 @@ impl<F> Signs<F> {
 }
 
 impl<F> Signs<F> {
-    /// The lanes that meet each of the voxels.
+    /// The lanes that meet each of the voxels. Edges may go through the middle if `TIES`.
     #[inline(always)]
-    fn met<V: Simd>(&self, layers: Layers) -> [Lanes; 8]
+    fn met<V: Simd, const TIES: bool>(&self, layers: Layers) -> [Lanes; 8]
     where
         F: SimdFloat<V>,
         F::Element: From<f32>,
@@ -138,7 +139,10 @@ impl<F> Signs<F> {
         for i in 0..3 {
             let (a, b) = ((i + 1) % 3, (i + 2) % 3);
             for k in 0..3 {
-                let outside = negative(self.edges[i][k]) ^ n[i];
+                let below = negative(self.edges[i][k]);
+                // Against the normal, what is not below is above.
+                let above = if TIES { positive(self.edges[i][k]) } else { !below };
+                let outside = below & !n[i] | above & n[i];
                 // Away from the triangle, the edge's normal is (e_b, -e_a) if it turns left.
                 let (a_low, b_high) = (e[k][b] ^ n[i], e[k][a] ^ n[i]);
                 let (low, high) = (outside & a_low, outside & !a_low);

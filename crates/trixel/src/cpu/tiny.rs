@@ -428,8 +428,9 @@ mod tests {
         let placement = Placement::ALL[round as usize % Placement::ALL.len()];
         let mut rows = [[[0; LANES]; 3]; 3];
         for lane in 0..LANES {
-            let extent = random.range(1, side - 1);
-            let corners = triangle(random, placement, 0, side - 1 - extent, extent);
+            // Of any extent, and anywhere in the cube: cut off at its border.
+            let extent = random.range(1, side);
+            let corners = triangle(random, placement, 0, side - 1, extent);
             for (k, i) in (0..9).map(|at| (at / 3, at % 3)) {
                 // A box of the cube's voxels and no more.
                 let most = side * i64::from(STEPS_PER_VOXEL) - 1;
