@@ -17,9 +17,9 @@ use fearless_simd::{Simd, i32x16, prelude::*};
 use super::number::SMALL_EXTENT;
 use super::rule::{Rule, Solid, SurfaceRule};
 use super::sink::{CubeSink, Sink};
-use super::triangles::{Block, LANES, Queue, Selected, Vectors};
+use super::triangles::{Block, LANES, Lanes, Queue, Selected, Vectors, base};
 use super::{crossings, large, rows, tiny};
-use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
+use crate::lattice::{LatticeMesh, STEP_BITS, STEPS_PER_VOXEL};
 
 /// The voxel indices of a box, both ends included.
 #[derive(Clone, Copy, Debug)]
@@ -73,25 +73,27 @@ const WORTH_BOXES: u32 = 4;
 /// Lanes from which on it pays to do triangles of at most two voxels along each axis without gathering more.
 const WORTH_OCTANTS: u32 = 9;
 
-/// Sends the voxels of a surface mode inside `clip` to `sink`.
+/// Sends the voxels of a surface mode inside `clip` to `sink`, until it is full or there are no more pieces.
 #[inline(always)]
-pub(super) fn surface<V: Simd, R: SurfaceRule>(
+pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
     simd: V,
     rule: &R,
-    triangles: &Selected<'_>,
+    mesh: &LatticeMesh<'_>,
+    pieces: impl Iterator<Item = Selected<'a>>,
     clip: &VoxelBox,
-    sink: &mut impl CubeSink,
+    sink: &mut S,
 ) {
     let mut scratch = Scratch::default();
     let mut waiting = Waiting::new();
-    let base = triangles.base(clip);
+    let base = base(mesh, clip);
     let near = NearClip::new(simd, clip, base);
     for_each_vector(
         simd,
-        triangles,
+        pieces,
         base,
+        sink,
         #[inline(always)]
-        |at, corners, lanes| {
+        |sink, triangles, at, corners, lanes| {
             let [low, high] = corners.boxes();
             let meets = near.meets(&low, &high) & lanes;
             if meets == 0 {
@@ -164,8 +166,13 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
                     );
                 }
             }
-            for lane in set_bits(meets & !settled & !two & !tiny) {
-                not_tiny(simd, rule, triangles, at + lane, clip, sink, &mut scratch);
+            let others = meets & !settled & !two & !tiny;
+            if S::LEAVES {
+                leave(triangles, at, others, &low, &high, &near, sink);
+            } else {
+                for lane in set_bits(others) {
+                    not_tiny(simd, rule, triangles, at + lane, clip, sink, &mut scratch);
+                }
             }
         },
     );
@@ -180,19 +187,42 @@ pub(super) fn surface<V: Simd, R: SurfaceRule>(
     tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, true, &near, sink);
 }
 
+/// Leaves the triangles in `lanes` of the vector that starts with the `at`th.
+#[inline(always)]
+fn leave<V: Simd>(
+    triangles: &Selected<'_>,
+    at: usize,
+    lanes: Lanes,
+    low: &[i32x16<V>; 3],
+    high: &[i32x16<V>; 3],
+    near: &NearClip<V>,
+    sink: &mut impl Sink,
+) {
+    if lanes != 0 {
+        let from = [*low[0].max(near.low[0]), *low[1].max(near.low[1])];
+        let to = *high[0].min(near.high[0]);
+        for lane in set_bits(lanes) {
+            let along = |i: usize, of: &[i32; LANES]| near.base[i] + i64::from(of[lane % LANES]);
+            sink.leave(triangles.number(at + lane), [along(0, &from[0]), along(0, &to)], along(1, &from[1]));
+        }
+    }
+}
+
 /// [`surface`] for triangles that are not tiny.
 #[cfg(feature = "threads")]
 #[inline(always)]
-pub(super) fn surface_not_tiny<V: Simd, R: SurfaceRule>(
+pub(super) fn surface_not_tiny<'a, V: Simd, R: SurfaceRule>(
     simd: V,
     rule: &R,
-    triangles: &Selected<'_>,
+    pieces: impl Iterator<Item = Selected<'a>>,
     clip: &VoxelBox,
     sink: &mut impl Sink,
 ) {
     let mut scratch = Scratch::default();
-    for i in 0..triangles.len() {
-        not_tiny(simd, rule, triangles, i, clip, sink, &mut scratch);
+    for triangles in pieces {
+        for i in 0..triangles.len() {
+            not_tiny(simd, rule, &triangles, i, clip, sink, &mut scratch);
+        }
     }
 }
 
@@ -210,9 +240,6 @@ fn not_tiny<V: Simd, R: SurfaceRule>(
     let triangle = triangles.corners(i);
     let around = VoxelBox::around(&triangle);
     let Some(clipped) = around.clipped(clip) else { return };
-    if sink.leaves(triangles.number(i), [clipped.low[0], clipped.high[0]]) {
-        return;
-    }
     let extent = around.extent();
     if R::TOUCH_IS_ENOUGH && extent[0].min(1) + extent[1].min(1) + extent[2].min(1) <= 1 {
         // Strictly inside a row of voxels.
@@ -226,25 +253,31 @@ fn not_tiny<V: Simd, R: SurfaceRule>(
     by_size(simd, rule, &triangle, &around, &clipped, sink, scratch);
 }
 
-/// Calls `each` with the number of the first, the corners and the used lanes of every vector of triangles.
+/// Calls `each` with the sink, and of every vector of triangles the piece they are of, the number of the first, the corners
+/// and the used lanes.
 #[inline(always)]
-fn for_each_vector<V: Simd>(
+fn for_each_vector<'a, V: Simd, S: Sink>(
     simd: V,
-    triangles: &Selected<'_>,
+    mut pieces: impl Iterator<Item = Selected<'a>>,
     base: [i64; 3],
-    mut each: impl FnMut(usize, Vectors<V>, u64),
+    sink: &mut S,
+    mut each: impl FnMut(&mut S, &Selected<'a>, usize, Vectors<V>, Lanes),
 ) {
     let mut block = Block::NONE;
-    let mut start = 0;
-    while start < triangles.len() {
-        let count = triangles.load(start, base, &mut block);
-        let mut first = 0;
-        while first < count {
-            let lanes = u64::MAX >> (64 - (count - first).min(LANES));
-            each(start + first, block.vectors(simd, first), lanes);
-            first += LANES;
+    while !sink.is_full()
+        && let Some(triangles) = pieces.next()
+    {
+        let mut start = 0;
+        while start < triangles.len() {
+            let count = triangles.load(start, base, &mut block);
+            let mut first = 0;
+            while first < count {
+                let lanes = Lanes::MAX >> (64 - (count - first).min(LANES));
+                each(sink, &triangles, start + first, block.vectors(simd, first), lanes);
+                first += LANES;
+            }
+            start += count;
         }
-        start += count;
     }
 }
 
@@ -322,18 +355,26 @@ impl Waiting {
 /// Sends the toggles of mode solid inside `clip` to `sink`: runs from the lowest voxel whose centre is not below the
 /// triangle to the top of the clip. A triangle below the clip gives whole columns.
 #[inline(always)]
-pub(super) fn solid<V: Simd>(simd: V, rule: &Solid, triangles: &Selected<'_>, clip: &VoxelBox, sink: &mut impl Sink) {
+pub(super) fn solid<'a, V: Simd, S: Sink>(
+    simd: V,
+    rule: &Solid,
+    mesh: &LatticeMesh<'_>,
+    pieces: impl Iterator<Item = Selected<'a>>,
+    clip: &VoxelBox,
+    sink: &mut S,
+) {
     let mut scratch = Scratch::default();
     // Those with centres of at most two by two columns, and of four by four.
     let (mut twos, mut fours) = (Queue::EMPTY, Queue::EMPTY);
-    let base = triangles.base(clip);
+    let base = base(mesh, clip);
     let near = NearClip::new(simd, clip, base);
     for_each_vector(
         simd,
-        triangles,
+        pieces,
         base,
+        sink,
         #[inline(always)]
-        |at, corners, lanes| {
+        |sink, triangles, at, corners, lanes| {
             let columns = crossings::columns(&corners, &near);
             let mut some = lanes;
             let mut few = lanes;
@@ -360,8 +401,12 @@ pub(super) fn solid<V: Simd>(simd: V, rule: &Solid, triangles: &Selected<'_>, cl
                     || crossings::flush::<_, 4>(simd, &mut fours, false, &near, clip, sink),
                 );
             }
-            for lane in set_bits(some & !tiny) {
-                centre(simd, rule, triangles, at + lane, clip, sink, &mut scratch);
+            if S::LEAVES {
+                leave(triangles, at, some & !tiny, &low, &high, &near, sink);
+            } else {
+                for lane in set_bits(some & !tiny) {
+                    centre(simd, rule, triangles, at + lane, clip, sink, &mut scratch);
+                }
             }
         },
     );
@@ -371,28 +416,32 @@ pub(super) fn solid<V: Simd>(simd: V, rule: &Solid, triangles: &Selected<'_>, cl
 
 /// Sends the voxels of mode sliced, or the toggles of mode solid, inside `clip` to `sink`: one triangle after the other.
 #[inline(always)]
-pub(super) fn centres<V: Simd, R: Rule>(
+pub(super) fn centres<'a, V: Simd, R: Rule>(
     simd: V,
     rule: &R,
-    triangles: &Selected<'_>,
+    mut pieces: impl Iterator<Item = Selected<'a>>,
     clip: &VoxelBox,
     sink: &mut impl Sink,
 ) {
     let mut scratch = Scratch::default();
-    for i in 0..triangles.len() {
-        centre(simd, rule, triangles, i, clip, sink, &mut scratch);
+    while !sink.is_full()
+        && let Some(triangles) = pieces.next()
+    {
+        for i in 0..triangles.len() {
+            centre(simd, rule, &triangles, i, clip, sink, &mut scratch);
+        }
     }
 }
 
 /// Sends the voxels of the `i`th triangle in a mode that looks along z from voxel centres.
 #[inline(always)]
-fn centre<V: Simd, R: Rule>(
+fn centre<V: Simd, R: Rule, S: Sink>(
     simd: V,
     rule: &R,
     triangles: &Selected<'_>,
     i: usize,
     clip: &VoxelBox,
-    sink: &mut impl Sink,
+    sink: &mut S,
     scratch: &mut Scratch,
 ) {
     const HALF: i64 = (STEPS_PER_VOXEL / 2) as i64;
@@ -406,9 +455,10 @@ fn centre<V: Simd, R: Rule>(
         high: [high(0).min(clip.high[0]), high(1).min(clip.high[1]), clip.high[2]],
     };
     if columns.low[0] <= columns.high[0] && columns.low[1] <= columns.high[1] {
-        let around = VoxelBox::around(&triangle);
-        if !sink.leaves(triangles.number(i), [columns.low[0], columns.high[0]]) {
-            by_size(simd, rule, &triangle, &around, &columns, sink, scratch);
+        if S::LEAVES {
+            sink.leave(triangles.number(i), [columns.low[0], columns.high[0]], columns.low[1]);
+        } else {
+            by_size(simd, rule, &triangle, &VoxelBox::around(&triangle), &columns, sink, scratch);
         }
     }
 }

@@ -51,7 +51,7 @@ use crate::volume::{Volume, VolumeError};
 
 /// Voxelizes on the CPU. The result is the same for any number of threads.
 ///
-/// With several threads it keeps scratch memory between calls, up to 24 MiB and 16 MiB a thread, so use one again rather than
+/// With several threads it keeps scratch memory between calls, up to 32 MiB and 16 MiB a thread, so use one again rather than
 /// making another.
 #[derive(Debug, Default)]
 pub struct CpuBackend {

@@ -17,7 +17,12 @@ pub(super) struct Cuts {
     of_x: Vec<u32>,
     columns: usize,
     column_words: usize,
+    /// From y to a strip, by shifting.
+    strip_shift: u32,
 }
+
+/// Parts along y by which the triangles of a slab are sorted.
+pub(super) const STRIPS: usize = 8;
 
 impl Cuts {
     /// Slabs that begin at each but the last of `at`, which is the grid's end, for columns along y and words of a column.
@@ -26,7 +31,8 @@ impl Cuts {
         for (slab, range) in (0u32..).zip(at.windows(2)) {
             of_x.resize(range[1] as usize, slab);
         }
-        Self { at, of_x, columns, column_words }
+        let strip_shift = (0..usize::BITS).find(|shift| columns.saturating_sub(1) >> shift < STRIPS).unwrap_or(0);
+        Self { at, of_x, columns, column_words, strip_shift }
     }
 
     /// The number of slabs.
@@ -72,8 +78,8 @@ pub(super) struct Compartment {
     small: Vec<u64>,
     /// Larger cubes: their bits, and a place with 0 or 1 for a side of 3 or 4.
     cubes: Vec<[u64; 2]>,
-    /// The numbers of triangles to be voxelized inside the slab.
-    triangles: Vec<u32>,
+    /// The numbers of triangles to be voxelized inside the slab, by the strip in which their boxes begin.
+    triangles: [Vec<u32>; STRIPS],
 }
 
 /// What one thread has found for all slabs: the voxels of tiny triangles, and the numbers of all others.
@@ -102,24 +108,18 @@ impl<'a> Outbox<'a> {
         self.slabs
     }
 
-    /// Whether the slabs should be painted before more is put in.
-    pub(super) fn is_full(&self) -> bool {
-        let entries = |slab: &Compartment| slab.small.len() + 2 * slab.cubes.len() + slab.triangles.len();
-        self.slabs.iter().map(entries).sum::<usize>() >= Self::MOST_ENTRIES
-    }
-
     /// Forgets what was painted.
     pub(super) fn clear(&mut self) {
         for Compartment { small, cubes, triangles } in &mut self.slabs {
             small.clear();
             cubes.clear();
-            triangles.clear();
+            triangles.iter_mut().for_each(Vec::clear);
         }
     }
 
-    /// The triangles left to a slab.
-    pub(super) fn triangles(&self, slab: usize) -> &[u32] {
-        &self.slabs[slab].triangles
+    /// The triangles left to a slab that begin in a strip.
+    pub(super) fn triangles(&self, slab: usize, strip: usize) -> &[u32] {
+        &self.slabs[slab].triangles[strip]
     }
 
     /// Sets the voxels left to a slab.
@@ -212,15 +212,26 @@ impl Sink for Outbox<'_> {
         self.push::<2>(slab, word as isize, 0, from as u32 % WORD_BITS);
     }
 
+    const LEAVES: bool = true;
+
     #[inline(always)]
-    fn leaves(&mut self, number: usize, x: [i64; 2]) -> bool {
+    fn leave(&mut self, number: usize, x: [i64; 2], y: i64) {
+        let strip = usize::try_from(y >> self.cuts.strip_shift).unwrap_or(0) % STRIPS;
         if let (Some(first), Some(last)) = (self.cuts.of(x[0]), self.cuts.of(x[1])) {
             for slab in &mut self.slabs[first..=last] {
                 #[expect(clippy::cast_possible_truncation, reason = "meshes with more are voxelized by one thread")]
-                slab.triangles.push(number as u32);
+                slab.triangles[strip].push(number as u32);
             }
         }
-        true
+    }
+
+    /// Whether the slabs should be painted before more is put in.
+    #[inline(always)]
+    fn is_full(&self) -> bool {
+        let entries = |slab: &Compartment| {
+            slab.small.len() + 2 * slab.cubes.len() + slab.triangles.iter().map(Vec::len).sum::<usize>()
+        };
+        self.slabs.iter().map(entries).sum::<usize>() >= Self::MOST_ENTRIES
     }
 }
 

@@ -4,14 +4,12 @@ use fearless_simd::{Level, dispatch};
 
 use super::kernel::{self, VoxelBox};
 #[cfg(feature = "threads")]
-use super::outbox::Outbox;
+use super::outbox::{Outbox, STRIPS};
 use super::rule::{Conservative, Sliced, Solid, SurfaceRule, Thin};
 use super::sink::{CubeSink, SetRuns, Slab, ToggleRuns};
 use super::triangles::Selected;
 use crate::job::Job;
-#[cfg(feature = "threads")]
-use crate::lattice::LatticeMesh;
-use crate::lattice::STEP_BITS;
+use crate::lattice::{LatticeMesh, STEP_BITS};
 use crate::mode::Mode;
 
 /// Paints triangles in one mode.
@@ -41,76 +39,100 @@ impl Painter {
     }
 
     /// Sets or toggles the voxels of the triangles inside `clip` in `slab`, which holds all of it.
-    pub(super) fn paint(&self, triangles: &Selected<'_>, clip: &VoxelBox, slab: Slab<'_>) {
+    pub(super) fn paint<'a>(
+        &self,
+        mesh: &LatticeMesh<'_>,
+        pieces: impl Iterator<Item = Selected<'a>>,
+        clip: &VoxelBox,
+        slab: Slab<'_>,
+    ) {
         match self.mode {
-            Mode::Conservative => surface(self.level, &Conservative, triangles, clip, &mut SetRuns(slab)),
-            Mode::Thin => surface(self.level, &Thin, triangles, clip, &mut SetRuns(slab)),
+            Mode::Conservative => surface(self.level, &Conservative, mesh, pieces, clip, &mut SetRuns(slab)),
+            Mode::Thin => surface(self.level, &Thin, mesh, pieces, clip, &mut SetRuns(slab)),
             Mode::Sliced => {
                 let (rule, mut sink) = (Sliced { overlap: self.overlap }, SetRuns(slab));
-                dispatch!(self.level, simd => kernel::centres(simd, &rule, triangles, clip, &mut sink));
+                dispatch!(self.level, simd => kernel::centres(simd, &rule, pieces, clip, &mut sink));
             }
             Mode::Solid => {
                 let mut sink = ToggleRuns(slab);
-                dispatch!(self.level, simd => kernel::solid(simd, &Solid, triangles, clip, &mut sink));
+                dispatch!(self.level, simd => kernel::solid(simd, &Solid, mesh, pieces, clip, &mut sink));
             }
         }
     }
 
-    /// Sorts the triangles, or what tiny ones set or toggle, into the slabs of an outbox.
+    /// Sorts the triangles, or what tiny ones set or toggle, into the slabs of an outbox, until it is full.
     #[cfg(feature = "threads")]
-    pub(super) fn sort(&self, triangles: &Selected<'_>, grid: &VoxelBox, outbox: &mut Outbox<'_>) {
+    pub(super) fn sort<'a>(
+        &self,
+        mesh: &LatticeMesh<'_>,
+        pieces: impl Iterator<Item = Selected<'a>>,
+        grid: &VoxelBox,
+        outbox: &mut Outbox<'_>,
+    ) {
         match self.mode {
-            Mode::Conservative => surface(self.level, &Conservative, triangles, grid, outbox),
-            Mode::Thin => surface(self.level, &Thin, triangles, grid, outbox),
+            Mode::Conservative => surface(self.level, &Conservative, mesh, pieces, grid, outbox),
+            Mode::Thin => surface(self.level, &Thin, mesh, pieces, grid, outbox),
             Mode::Sliced => {
                 let rule = Sliced { overlap: self.overlap };
-                dispatch!(self.level, simd => kernel::centres(simd, &rule, triangles, grid, outbox));
+                dispatch!(self.level, simd => kernel::centres(simd, &rule, pieces, grid, outbox));
             }
-            Mode::Solid => dispatch!(self.level, simd => kernel::solid(simd, &Solid, triangles, grid, outbox)),
+            Mode::Solid => dispatch!(self.level, simd => kernel::solid(simd, &Solid, mesh, pieces, grid, outbox)),
         }
     }
 
-    /// Paints what an outbox holds for a slab.
+    /// Paints what outboxes hold for a slab.
     #[cfg(feature = "threads")]
     pub(super) fn paint_sorted(
         &self,
         mesh: &LatticeMesh<'_>,
-        outbox: &Outbox<'_>,
+        outboxes: &[Outbox<'_>],
         slab: usize,
         clip: &VoxelBox,
-        into: &mut Slab<'_>,
+        mut into: Slab<'_>,
     ) {
-        let triangles = Selected::listed(mesh, outbox.triangles(slab));
-        if self.toggles() {
-            outbox.toggle(slab, into);
-            let mut sink = ToggleRuns(into.reborrow());
-            dispatch!(self.level, simd => kernel::centres(simd, &Solid, &triangles, clip, &mut sink));
-            return;
+        for outbox in outboxes {
+            if self.toggles() {
+                outbox.toggle(slab, &mut into);
+            } else {
+                outbox.set(slab, &mut into);
+            }
         }
-        outbox.set(slab, into);
-        let mut sink = SetRuns(into.reborrow());
+        // Strip by strip, so that what is painted is near each other.
+        let strips = (0..STRIPS).flat_map(|strip| outboxes.iter().map(move |outbox| outbox.triangles(slab, strip)));
+        let pieces = strips.map(|numbers| Selected::listed(mesh, numbers));
         match self.mode {
-            Mode::Conservative => not_tiny(self.level, &Conservative, &triangles, clip, &mut sink),
-            Mode::Thin => not_tiny(self.level, &Thin, &triangles, clip, &mut sink),
-            Mode::Sliced | Mode::Solid => {
-                let rule = Sliced { overlap: self.overlap };
-                dispatch!(self.level, simd => kernel::centres(simd, &rule, &triangles, clip, &mut sink));
+            Mode::Conservative => not_tiny(self.level, &Conservative, pieces, clip, &mut SetRuns(into)),
+            Mode::Thin => not_tiny(self.level, &Thin, pieces, clip, &mut SetRuns(into)),
+            Mode::Sliced => {
+                let (rule, mut sink) = (Sliced { overlap: self.overlap }, SetRuns(into));
+                dispatch!(self.level, simd => kernel::centres(simd, &rule, pieces, clip, &mut sink));
+            }
+            Mode::Solid => {
+                let mut sink = ToggleRuns(into);
+                dispatch!(self.level, simd => kernel::centres(simd, &Solid, pieces, clip, &mut sink));
             }
         }
     }
 }
 
 #[cfg(feature = "threads")]
-fn not_tiny<R: SurfaceRule>(level: Level, rule: &R, triangles: &Selected<'_>, clip: &VoxelBox, sink: &mut SetRuns<'_>) {
-    dispatch!(level, simd => kernel::surface_not_tiny(simd, rule, triangles, clip, sink));
-}
-
-fn surface<R: SurfaceRule>(
+fn not_tiny<'a, R: SurfaceRule>(
     level: Level,
     rule: &R,
-    triangles: &Selected<'_>,
+    pieces: impl Iterator<Item = Selected<'a>>,
+    clip: &VoxelBox,
+    sink: &mut SetRuns<'_>,
+) {
+    dispatch!(level, simd => kernel::surface_not_tiny(simd, rule, pieces, clip, sink));
+}
+
+fn surface<'a, R: SurfaceRule>(
+    level: Level,
+    rule: &R,
+    mesh: &LatticeMesh<'_>,
+    pieces: impl Iterator<Item = Selected<'a>>,
     clip: &VoxelBox,
     sink: &mut impl CubeSink,
 ) {
-    dispatch!(level, simd => kernel::surface(simd, rule, triangles, clip, sink));
+    dispatch!(level, simd => kernel::surface(simd, rule, mesh, pieces, clip, sink));
 }

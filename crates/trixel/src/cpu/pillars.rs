@@ -158,7 +158,8 @@ impl<'a> BinnedMesh<'a> {
                 clip.low[2] -= 1;
             }
             let slab = Slab { words: tile.words.as_mut_slice(), start, columns: SIDE, column_words: 1 };
-            self.painter.paint(&Selected::listed(self.mesh, indices), &clip, slab);
+            let listed = Selected::listed(self.mesh, indices);
+            self.painter.paint(self.mesh, std::iter::once(listed), &clip, slab);
             if toggles {
                 inside.pass(tile, nz - at_z * PILLAR_SIDE);
             }

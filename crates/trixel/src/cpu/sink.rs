@@ -25,10 +25,16 @@ pub(super) trait Sink {
         });
     }
 
-    /// Whether a triangle that is not tiny, of which the number and the range of x inside the clip are given, is left for
-    /// later.
+    /// Whether triangles that are not tiny are left for later.
+    const LEAVES: bool = false;
+
+    /// Leaves a triangle, of which the number and, of its box inside the clip, the range of x and the least y are given.
     #[inline(always)]
-    fn leaves(&mut self, _number: usize, _x: [i64; 2]) -> bool {
+    fn leave(&mut self, _number: usize, _x: [i64; 2], _y: i64) {}
+
+    /// Whether it should not be given more for now.
+    #[inline(always)]
+    fn is_full(&self) -> bool {
         false
     }
 }

@@ -29,13 +29,17 @@ pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut V
         /// Below this many triangles' worth of work, waking threads costs more than it saves.
         const WORTH_THREADS: u64 = 2000;
         let threads = rayon::current_num_threads();
-        // Outboxes have triangles as 32-bit numbers.
-        let shared = dims[0] > 1 && u32::try_from(mesh.triangles.len()).is_ok();
-        if threads > 1 && shared && parallel::weight_at_least(mesh, volume, WORTH_THREADS) {
+        // Threads share triangles by 32-bit numbers.
+        if let Ok(triangles) = u32::try_from(mesh.triangles.len())
+            && threads > 1
+            && dims[0] > 1
+            && parallel::weight_at_least(mesh, volume, WORTH_THREADS)
+        {
+            let parts = parallel::Parts::new(triangles, threads);
             if parallel::copies_are_small(mesh, volume, threads) {
-                parallel::voxelize_in_copies(painter, mesh, volume, threads, spare);
+                parallel::voxelize_in_copies(painter, mesh, volume, &parts, spare);
             } else {
-                parallel::voxelize_in_slabs(painter, mesh, volume, threads, spare);
+                parallel::voxelize_in_slabs(painter, mesh, volume, &parts, spare);
             }
             return;
         }
@@ -44,7 +48,7 @@ pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut V
     volume.clear();
     let mut slab = Slab { words: volume.words_mut(), start: [0; 3], columns, column_words };
     let all = Selected::range(mesh, 0..mesh.triangles.len());
-    painter.paint(&all, &clip_of(dims, 0..dims[0]), slab.reborrow());
+    painter.paint(mesh, std::iter::once(all), &clip_of(dims, 0..dims[0]), slab.reborrow());
     if painter.toggles() {
         prefix_xor(slab.words, column_words, dims[2]);
     }
@@ -58,8 +62,9 @@ fn clip_of(volume_dims: [u32; 3], x_range: std::ops::Range<u32>) -> VoxelBox {
 
 #[cfg(feature = "threads")]
 mod parallel {
-    use std::ops::Range;
-    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::ops::{Range, RangeInclusive};
+    use std::sync::Mutex;
+    use std::sync::atomic::{AtomicU64, Ordering};
 
     use rayon::prelude::*;
 
@@ -68,13 +73,13 @@ mod parallel {
     use crate::cpu::triangles::corners;
     use crate::volume::Volume;
 
-    /// Slabs a thread.
-    const SLABS: usize = 3;
+    /// The smallest slab has this part of a thread's work.
+    const SMALLEST: i64 = 16;
     /// Pieces of the triangles a thread, within limits of triangles.
-    const CHUNKS: usize = 32;
-    const CHUNK: Range<usize> = 1 << 10..1 << 12;
-    /// Pieces of the grid a thread, when copies are put together.
-    const PIECES: usize = 8;
+    const PIECES: u64 = 64;
+    const PIECE: RangeInclusive<u64> = 1 << 8..=1 << 11;
+    /// Layers of the grid a thread, when copies are put together.
+    const LAYERS: usize = 8;
     /// Triangles that are looked at to cut the grid.
     const SAMPLES: usize = 1 << 11;
 
@@ -126,33 +131,64 @@ mod parallel {
         volume.words().len() > 1 << 18
     }
 
-    /// The triangles in pieces, for whoever comes first.
-    struct Chunks {
-        all: usize,
-        size: usize,
-        taken: AtomicUsize,
+    /// The triangles, in a part for each thread: it begins at the start of its own, and goes on at the ends of the others'.
+    pub(super) struct Parts {
+        /// What is left of each: the first in the lower half, the end in the upper.
+        left: Vec<AtomicU64>,
+        /// Triangles in a piece.
+        size: u64,
     }
 
-    impl Chunks {
-        fn new(all: usize, threads: usize) -> Self {
-            Self { all, size: (all / (threads * CHUNKS)).clamp(CHUNK.start, CHUNK.end), taken: AtomicUsize::new(0) }
+    impl Parts {
+        pub(super) fn new(triangles: u32, threads: usize) -> Self {
+            let (all, parts) = (u64::from(triangles), threads as u64);
+            let left = (0..parts).map(|i| AtomicU64::new((all * (i + 1) / parts) << 32 | all * i / parts)).collect();
+            Self { left, size: (all / (parts * PIECES)).clamp(*PIECE.start(), *PIECE.end()) }
         }
 
-        fn next(&self) -> Option<Range<usize>> {
-            let start = self.taken.fetch_add(self.size, Ordering::Relaxed);
-            (start < self.all).then(|| start..self.all.min(start + self.size))
+        /// The threads.
+        fn count(&self) -> usize {
+            self.left.len()
+        }
+
+        /// A piece for the `i`th thread.
+        fn next(&self, i: usize) -> Option<Range<usize>> {
+            let parts = self.count();
+            (0..parts).find_map(|other| self.take((i + other) % parts, other != 0))
+        }
+
+        /// [`Self::next`], until there are none.
+        fn pieces<'a>(&self, mesh: &'a LatticeMesh<'a>, i: usize) -> impl Iterator<Item = Selected<'a>> {
+            std::iter::from_fn(move || self.next(i)).map(|range| Selected::range(mesh, range))
+        }
+
+        #[expect(clippy::cast_possible_truncation, reason = "the halves")]
+        fn take(&self, part: usize, from_end: bool) -> Option<Range<usize>> {
+            let split = |left: u64| u64::from(left as u32)..left >> 32;
+            let left = self.left[part].fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
+                let Range { start, end } = split(left);
+                let size = self.size.min(end.saturating_sub(start));
+                (size > 0).then(|| if from_end { (end - size) << 32 | start } else { end << 32 | start + size })
+            });
+            let Range { start, end } = split(left.ok()?);
+            let size = self.size.min(end - start);
+            let taken = if from_end { end - size..end } else { start..start + size };
+            Some(taken.start as usize..taken.end as usize)
         }
 
         fn all_taken(&self) -> bool {
-            self.taken.load(Ordering::Relaxed) >= self.all
+            self.left.iter().all(|left| {
+                let left = left.load(Ordering::Relaxed);
+                left >> 32 == left & u64::from(u32::MAX)
+            })
         }
     }
 
     /// Whether grids of their own for all threads cost less than sorting the triangles: measured, they do as long as they
     /// fit the cache that threads share, and are not large beside the mesh.
     pub(super) fn copies_are_small(mesh: &LatticeMesh<'_>, volume: &Volume, threads: usize) -> bool {
-        /// 24 MiB, and so few in tests that some grids are larger.
-        const MOST_WORDS: usize = if cfg!(test) { 1 << 16 } else { 3 << 20 };
+        /// 32 MiB, and so few in tests that some grids are larger.
+        const MOST_WORDS: usize = if cfg!(test) { 1 << 16 } else { 4 << 20 };
         /// For each triangle.
         const WORDS: usize = 16;
         let words = volume.words().len().saturating_mul(threads);
@@ -164,7 +200,7 @@ mod parallel {
         painter: &Painter,
         mesh: &LatticeMesh<'_>,
         volume: &mut Volume,
-        threads: usize,
+        parts: &Parts,
         spare: &Spare,
     ) {
         let dims = volume.grid().dims();
@@ -173,44 +209,42 @@ mod parallel {
         let words = volume.words_mut();
         let length = words.len();
         let mut copies = std::mem::take(&mut spare.lock().copies);
+        let threads = parts.count();
         copies.resize_with(threads - 1, Vec::new);
-        let chunks = Chunks::new(mesh.triangles.len(), threads);
         let grid = clip_of(dims, 0..dims[0]);
-        let paint = |words: &mut [u64]| {
-            let mut slab = Slab { words, start: [0; 3], columns, column_words };
-            while let Some(range) = chunks.next() {
-                painter.paint(&Selected::range(mesh, range), &grid, slab.reborrow());
-            }
+        let paint = |i: usize, words: &mut [u64]| {
+            let slab = Slab { words, start: [0; 3], columns, column_words };
+            painter.paint(mesh, parts.pieces(mesh, i), &grid, slab);
         };
         rayon::scope(|scope| {
-            for copy in &mut copies {
-                let (chunks, paint) = (&chunks, &paint);
+            for (i, copy) in (1..).zip(&mut copies) {
+                let paint = &paint;
                 scope.spawn(move |_| {
                     // Whoever comes too late needs none.
-                    if !chunks.all_taken() {
+                    if !parts.all_taken() {
                         if copy.len() < length {
                             *copy = vec![0; length];
                         }
-                        paint(&mut copy[..length]);
+                        paint(i, &mut copy[..length]);
                     }
                 });
             }
             if !clean {
                 words.fill(0);
             }
-            paint(words);
+            paint(0, words);
         });
         // Whole layers, as many as leave each thread several pieces.
-        let piece = columns * column_words * (dims[0] as usize).div_ceil(threads * PIECES);
+        let piece = columns * column_words * (dims[0] as usize).div_ceil(threads * LAYERS);
         let mut pieces: Vec<_> = words.chunks_mut(piece).map(|words| (words, Vec::new())).collect();
         for copy in copies.iter_mut().filter(|copy| !copy.is_empty()) {
-            for ((_, parts), part) in pieces.iter_mut().zip(copy[..length].chunks_mut(piece)) {
-                parts.push(part);
+            for ((_, from), copy) in pieces.iter_mut().zip(copy[..length].chunks_mut(piece)) {
+                from.push(copy);
             }
         }
-        pieces.into_par_iter().with_max_len(1).for_each(|(words, parts)| {
-            for part in parts {
-                move_voxels(part, words, painter.toggles());
+        pieces.into_par_iter().with_max_len(1).for_each(|(words, from)| {
+            for copy in from {
+                move_voxels(copy, words, painter.toggles());
             }
             if painter.toggles() {
                 prefix_xor(words, column_words, dims[2]);
@@ -238,38 +272,36 @@ mod parallel {
         painter: &Painter,
         mesh: &LatticeMesh<'_>,
         volume: &mut Volume,
-        threads: usize,
+        parts: &Parts,
         spare: &Spare,
     ) {
         let dims = volume.grid().dims();
-        let cuts = Cuts::new(cut(mesh, dims, threads * SLABS), dims[1] as usize, volume.column_words());
+        let threads = parts.count();
+        let cuts = Cuts::new(cut(mesh, dims, threads), dims[1] as usize, volume.column_words());
         let mut kept = std::mem::take(&mut spare.lock().outboxes);
         kept.resize_with(threads, Vec::new);
         let mut outboxes: Vec<_> = kept.into_iter().map(|kept| Outbox::new(&cuts, kept)).collect();
         let mut clean = volume.is_pristine();
         let words = volume.words_mut();
         let grid = clip_of(dims, 0..dims[0]);
-        let chunks = Chunks::new(mesh.triangles.len(), threads);
         loop {
-            outboxes.par_iter_mut().with_max_len(1).for_each(|outbox| {
+            outboxes.par_iter_mut().with_max_len(1).enumerate().for_each(|(i, outbox)| {
                 outbox.clear();
-                while !outbox.is_full()
-                    && let Some(range) = chunks.next()
-                {
-                    painter.sort(&Selected::range(mesh, range), &grid, outbox);
-                }
+                painter.sort(mesh, parts.pieces(mesh, i), &grid, outbox);
             });
-            let last = chunks.all_taken();
-            cuts.slabs(words).into_par_iter().enumerate().with_max_len(1).for_each(|(i, mut slab)| {
-                if !clean {
-                    slab.words.fill(0);
-                }
-                let clip = clip_of(dims, cuts.x(i));
-                for outbox in &outboxes {
-                    painter.paint_sorted(mesh, outbox, i, &clip, &mut slab);
-                }
-                if last && painter.toggles() {
-                    prefix_xor(slab.words, slab.column_words, dims[2]);
+            let last = parts.all_taken();
+            // For whoever comes first, one after the other: the largest are at the beginning.
+            let slabs = Mutex::new(cuts.slabs(words).into_iter().enumerate());
+            let next = || slabs.lock().unwrap_or_else(std::sync::PoisonError::into_inner).next();
+            (0..threads).into_par_iter().with_max_len(1).for_each(|_| {
+                while let Some((i, mut slab)) = next() {
+                    if !clean {
+                        slab.words.fill(0);
+                    }
+                    painter.paint_sorted(mesh, &outboxes, i, &clip_of(dims, cuts.x(i)), slab.reborrow());
+                    if last && painter.toggles() {
+                        prefix_xor(slab.words, slab.column_words, dims[2]);
+                    }
                 }
             });
             if last {
@@ -280,8 +312,8 @@ mod parallel {
         spare.lock().outboxes = outboxes.into_iter().map(Outbox::into_compartments).collect();
     }
 
-    /// Where to cut x so that each of up to `pieces` slabs holds about the same work; first 0, last nx.
-    fn cut(mesh: &LatticeMesh<'_>, dims: [u32; 3], pieces: usize) -> Vec<u32> {
+    /// Where to cut x, into slabs that hold ever less work, so that threads are done at about the same time; first 0, last nx.
+    fn cut(mesh: &LatticeMesh<'_>, dims: [u32; 3], threads: usize) -> Vec<u32> {
         let nx = dims[0] as usize;
         let [nx_signed, ny, _] = dims.map(i64::from);
         // Where the work is, is known well enough from some of the triangles.
@@ -309,9 +341,11 @@ mod parallel {
             before.push(total);
         }
         let mut cuts = vec![0u32];
-        for piece in 1..=pieces {
-            let target = i128::from(total) * piece as i128 / pieces as i128;
-            let x = before.partition_point(|&sum| i128::from(sum) < target);
+        let threads = i64::try_from(threads).unwrap_or(i64::MAX);
+        let mut done = 0;
+        while done < total {
+            done += ((total - done) / threads.saturating_mul(2)).max(total / threads.saturating_mul(SMALLEST)).max(1);
+            let x = before.partition_point(|&sum| sum < done);
             let x = u32::try_from(x).unwrap_or(dims[0]).min(dims[0]);
             if x > cuts[cuts.len() - 1] {
                 cuts.push(x);

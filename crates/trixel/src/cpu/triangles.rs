@@ -65,14 +65,6 @@ impl<'a> Selected<'a> {
         corners(self.mesh, self.mesh.triangles[self.number(i)])
     }
 
-    /// The voxel that the corners of blocks are seen from, so that they fit 32 bits wherever they may meet `clip`.
-    pub(super) fn base(&self, clip: &VoxelBox) -> [i64; 3] {
-        match self.mesh.positions {
-            LatticePositions::Narrow(_) => [0; 3],
-            LatticePositions::Wide(_) => [0, 1, 2].map(|i| (clip.low[i] + clip.high[i]) / 2),
-        }
-    }
-
     /// The triangles from `start` on, as many as fit a block.
     pub(super) fn load(&self, start: usize, base: [i64; 3], block: &mut Block) -> usize {
         let end = self.len().min(start + BLOCK);
@@ -104,6 +96,14 @@ impl<'a> Selected<'a> {
             }
         }
         end - start
+    }
+}
+
+/// The voxel that the corners of blocks are seen from, so that they fit 32 bits wherever they may meet `clip`.
+pub(super) fn base(mesh: &LatticeMesh<'_>, clip: &VoxelBox) -> [i64; 3] {
+    match mesh.positions {
+        LatticePositions::Narrow(_) => [0; 3],
+        LatticePositions::Wide(_) => [0, 1, 2].map(|i| (clip.low[i] + clip.high[i]) / 2),
     }
 }
 
