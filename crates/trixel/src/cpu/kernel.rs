@@ -70,8 +70,10 @@ struct Scratch {
 /// Lanes from which on it pays to look for triangles strictly inside a voxel or a row of two.
 const WORTH_BOXES: u32 = 4;
 
-/// Lanes from which on it pays to do triangles of at most two voxels along each axis without gathering more.
+/// Lanes from which on it pays to do triangles of at most two voxels along each axis without gathering more: by octants, or
+/// by more tests.
 const WORTH_OCTANTS: u32 = 9;
+const WORTH_CUBES: u32 = 12;
 
 /// Sends the voxels of a surface mode inside `clip` to `sink`, until it is full or there are no more pieces.
 #[inline(always)]
@@ -129,6 +131,11 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
                         || tiny::flush_octants(simd, &mut waiting.twos, false, &near, sink),
                     );
                 }
+            } else if two.count_ones() >= WORTH_CUBES {
+                simd.vectorize(
+                    #[inline(always)]
+                    || tiny::send_cubes::<_, _, 2>(simd, rule, &corners, two, &near, sink),
+                );
             } else if two != 0 && waiting.twos.push(simd, &corners, two) {
                 simd.vectorize(
                     #[inline(always)]

@@ -18,6 +18,8 @@
 mod crossings;
 mod filter;
 pub(crate) mod fragments;
+#[cfg(feature = "threads")]
+mod gate;
 mod instructions;
 mod kernel;
 mod large;

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use fearless_simd::{Simd, i32x16};
+use fearless_simd::{Simd, i32x16, prelude::*};
 
 use super::filter::Voxels;
-use super::sink::{CubeSink, Places, Sink, Slab, Steps, bits_of, set_columns, set_cube};
+use super::sink::{CubeSink, InWords, Sink, Slab, Steps, bits_of, set_columns, set_cube};
 use super::triangles::{LANES, Lanes};
 use crate::volume::WORD_BITS;
 
@@ -14,11 +14,19 @@ pub(super) struct Cuts {
     /// The first x of each slab, and the grid's end.
     at: Vec<u32>,
     /// The slab of each x.
-    of_x: Vec<u32>,
+    of_x: Vec<OfX>,
     columns: usize,
     column_words: usize,
     /// From y to a strip, by shifting.
     strip_shift: u32,
+}
+
+/// The slab of a layer across x.
+#[derive(Clone, Copy)]
+struct OfX {
+    slab: u32,
+    /// Layers from this one to the slab's end.
+    left: u32,
 }
 
 /// Parts along y by which the triangles of a slab are sorted.
@@ -27,10 +35,11 @@ pub(super) const STRIPS: usize = 8;
 impl Cuts {
     /// Slabs that begin at each but the last of `at`, which is the grid's end, for columns along y and words of a column.
     pub(super) fn new(at: Vec<u32>, columns: usize, column_words: usize) -> Self {
-        let mut of_x = vec![];
-        for (slab, range) in (0u32..).zip(at.windows(2)) {
-            of_x.resize(range[1] as usize, slab);
-        }
+        let of_x = (0u32..).zip(at.windows(2)).flat_map(|(slab, range)| {
+            let end = range[1];
+            (range[0]..end).map(move |x| OfX { slab, left: end - x })
+        });
+        let of_x = of_x.collect();
         let strip_shift = (0..usize::BITS).find(|shift| columns.saturating_sub(1) >> shift < STRIPS).unwrap_or(0);
         Self { at, of_x, columns, column_words, strip_shift }
     }
@@ -67,7 +76,14 @@ impl Cuts {
     /// The slab with x, if it is inside the grid.
     #[inline(always)]
     fn of(&self, x: i64) -> Option<usize> {
-        self.of_x.get(usize::try_from(x).ok()?).map(|&slab| slab as usize)
+        self.of_x.get(usize::try_from(x).ok()?).map(|of_x| of_x.slab as usize)
+    }
+
+    /// What is added to words of the grid so that those of all cubes are at least 0: cubes begin at most three columns before
+    /// a layer.
+    #[inline(always)]
+    fn bias(&self) -> usize {
+        3 * self.column_words
     }
 }
 
@@ -97,8 +113,13 @@ impl<'a> Outbox<'a> {
     /// Entries that it should hold at most, or little more: 8 to 16 MiB, and so few in tests that some leave more.
     const MOST_ENTRIES: usize = if cfg!(test) { 1 << 10 } else { 1 << 20 };
 
-    /// Uses the memory of `kept` compartments.
+    /// An empty one, in the memory of `kept` compartments.
     pub(super) fn new(cuts: &'a Cuts, mut kept: Vec<Compartment>) -> Self {
+        for Compartment { small, cubes, triangles } in &mut kept {
+            small.clear();
+            cubes.clear();
+            triangles.iter_mut().for_each(Vec::clear);
+        }
         kept.resize_with(cuts.len(), Compartment::default);
         Self { cuts, slabs: kept }
     }
@@ -106,15 +127,6 @@ impl<'a> Outbox<'a> {
     /// The compartments, to be used again.
     pub(super) fn into_compartments(self) -> Vec<Compartment> {
         self.slabs
-    }
-
-    /// Forgets what was painted.
-    pub(super) fn clear(&mut self) {
-        for Compartment { small, cubes, triangles } in &mut self.slabs {
-            small.clear();
-            cubes.clear();
-            triangles.iter_mut().for_each(Vec::clear);
-        }
     }
 
     /// The triangles left to a slab that begin in a strip.
@@ -128,11 +140,11 @@ impl<'a> Outbox<'a> {
         let steps = into.steps();
         let words = &mut *into.words;
         for &entry in &self.slabs[slab].small {
-            let (word, shift) = self.unpack(entry >> SMALL_BITS);
+            let (word, shift) = self.unpack(slab, entry >> SMALL_BITS);
             paint_cube::<2>(words, steps, word, entry & ((1 << SMALL_BITS) - 1), shift);
         }
         for &[bits, entry] in &self.slabs[slab].cubes {
-            let (word, shift) = self.unpack(entry >> 1);
+            let (word, shift) = self.unpack(slab, entry >> 1);
             if entry & 1 == 0 {
                 paint_cube::<3>(words, steps, word, bits, shift);
             } else {
@@ -144,54 +156,51 @@ impl<'a> Outbox<'a> {
     /// Toggles the voxels left to a slab.
     pub(super) fn toggle(&self, slab: usize, into: &mut Slab<'_>) {
         for &entry in &self.slabs[slab].small {
-            let (word, shift) = self.unpack(entry >> SMALL_BITS);
+            let (word, shift) = self.unpack(slab, entry >> SMALL_BITS);
             if let Some(word) = usize::try_from(word).ok().and_then(|word| into.words.get_mut(word)) {
                 *word ^= 1 << shift;
             }
         }
     }
 
-    /// A word of the volume, as a slab sees it, and a shift.
+    /// A word and a shift.
     #[inline(always)]
-    #[expect(
-        clippy::cast_sign_loss,
-        clippy::cast_possible_wrap,
-        reason = "cubes begin less than a layer before the slab"
-    )]
-    fn place(&self, slab: usize, word: isize, shift: u32) -> u64 {
-        let from_start = word + self.cuts.layer() as isize - (self.cuts.at[slab] as usize * self.cuts.layer()) as isize;
-        (from_start as u64) << SHIFT_BITS | u64::from(shift)
+    #[expect(clippy::cast_sign_loss, clippy::cast_possible_wrap, reason = "not below 0 with the bias; below 2^40")]
+    fn place(&self, word: isize, shift: u32) -> u64 {
+        ((word + self.cuts.bias() as isize) as u64) << SHIFT_BITS | u64::from(shift)
     }
 
-    /// The opposite of [`Self::place`].
+    /// The opposite of [`Self::place`], as a slab sees it.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "packed so")]
-    fn unpack(&self, place: u64) -> (isize, u32) {
-        ((place >> SHIFT_BITS) as isize - self.cuts.layer() as isize, place as u32 % WORD_BITS)
+    fn unpack(&self, slab: usize, place: u64) -> (isize, u32) {
+        let start = self.cuts.at[slab] as usize * self.cuts.layer() + self.cuts.bias();
+        ((place >> SHIFT_BITS) as isize - start as isize, place as u32 % WORD_BITS)
     }
 
     #[inline(always)]
-    fn push<const SIDE: usize>(&mut self, slab: usize, word: isize, bits: u64, shift: u32) {
-        let place = self.place(slab, word, shift);
+    fn push<const SIDE: usize>(&mut self, slab: usize, place: u64, bits: u64) {
+        let Compartment { small, cubes, .. } = &mut self.slabs[slab];
         if SIDE == 2 {
-            self.slabs[slab].small.push(place << SMALL_BITS | bits);
+            small.push(place << SMALL_BITS | bits);
         } else {
-            self.slabs[slab].cubes.push([bits, place << 1 | u64::from(SIDE == 4)]);
+            cubes.push([bits, place << 1 | u64::from(SIDE == 4)]);
         }
     }
 
     /// A cube that is not all in one slab, layer by layer.
     #[cold]
     #[inline(never)]
+    #[expect(clippy::cast_possible_wrap, reason = "of a grid")]
     fn push_layers<const SIDE: usize>(&mut self, mut x: i64, mut word: isize, mut bits: u64, shift: u32) {
         while bits != 0 {
             let here = bits & ((1 << (SIDE * SIDE)) - 1);
             if let Some(slab) = self.cuts.of(x).filter(|_| here != 0) {
-                self.push::<SIDE>(slab, word, here, shift);
+                self.push::<SIDE>(slab, self.place(word, shift), here);
             }
             bits >>= SIDE * SIDE;
             x += 1;
-            word = word.wrapping_add_unsigned(self.cuts.layer());
+            word += self.cuts.layer() as isize;
         }
     }
 }
@@ -209,7 +218,7 @@ impl Sink for Outbox<'_> {
         let Some(slab) = self.cuts.of(x) else { return };
         let column = x as usize * self.cuts.columns + y as usize;
         let word = column * self.cuts.column_words + (from as u32 / WORD_BITS) as usize;
-        self.push::<2>(slab, word as isize, 0, from as u32 % WORD_BITS);
+        self.push::<2>(slab, self.place(word as isize, from as u32 % WORD_BITS), 0);
     }
 
     const LEAVES: bool = true;
@@ -243,23 +252,52 @@ fn paint_cube<const SIDE: usize>(words: &mut [u64], steps: Steps, first: isize, 
 }
 
 impl CubeSink for Outbox<'_> {
+    type Places<V: Simd> = InWords<V>;
+
     #[inline(always)]
-    fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> Places {
-        Places::new(low, base, [0; 3], self.cuts.columns, self.cuts.column_words)
+    fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> InWords<V> {
+        InWords::new(low, base, [0; 3], self.cuts.columns, self.cuts.column_words)
     }
 
     #[inline(always)]
-    #[expect(clippy::cast_possible_wrap, reason = "at most 4")]
-    fn cubes<V: Simd, const SIDE: usize>(&mut self, places: &Places, voxels: &Voxels<V>, mut lanes: Lanes) {
-        let bits = [*voxels[0], *voxels[1]];
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        clippy::cast_sign_loss,
+        reason = "places as in `place`; an x below 0 is too large then"
+    )]
+    fn cubes<V: Simd, const SIDE: usize>(&mut self, places: &InWords<V>, voxels: &Voxels<V>, mut lanes: Lanes) {
+        let bias = self.cuts.bias() as i64;
+        let (shifts, bits) = (places.shifts.widen(), voxels[0].widen());
+        let mut entries =
+            [(places.words[0] + bias) << SHIFT_BITS | shifts.0, (places.words[1] + bias) << SHIFT_BITS | shifts.1];
+        if SIDE == 2 {
+            entries = [entries[0] << SMALL_BITS | bits.0, entries[1] << SMALL_BITS | bits.1];
+        }
+        let (x, entries, bits) = (*places.x, [*entries[0], *entries[1]], [*voxels[0], *voxels[1]]);
+        let mut left = 0u64;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LANES;
-            let (x, (word, shift), bits) = (i64::from(places.x[lane]), places.of(lane), bits_of::<SIDE>(&bits, lane));
-            match (self.cuts.of(x), self.cuts.of(x + SIDE as i64 - 1)) {
-                (Some(slab), Some(last)) if slab == last => self.push::<SIDE>(slab, word, bits, shift),
-                _ => self.push_layers::<SIDE>(x, word, bits, shift),
+            let entry = entries.as_flattened()[lane] as u64;
+            match self.cuts.of_x.get(x[lane] as u32 as usize) {
+                Some(of_x) if of_x.left >= SIDE as u32 => {
+                    let Compartment { small, cubes, .. } = &mut self.slabs[of_x.slab as usize];
+                    if SIDE == 2 {
+                        small.push(entry);
+                    } else {
+                        cubes.push([bits_of::<SIDE>(&bits, lane), entry << 1 | u64::from(SIDE == 4)]);
+                    }
+                }
+                _ => left |= 1 << lane,
             }
             lanes &= lanes - 1;
+        }
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize % LANES;
+            let word = [*places.words[0], *places.words[1]].as_flattened()[lane] as isize;
+            let shift = places.shifts[lane] as u32;
+            self.push_layers::<SIDE>(i64::from(x[lane]), word, bits_of::<SIDE>(&bits, lane), shift);
+            left &= left - 1;
         }
     }
 }

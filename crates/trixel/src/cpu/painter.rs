@@ -82,15 +82,15 @@ impl Painter {
 
     /// Paints what outboxes hold for a slab.
     #[cfg(feature = "threads")]
-    pub(super) fn paint_sorted(
+    pub(super) fn paint_sorted<'a, 'b: 'a>(
         &self,
         mesh: &LatticeMesh<'_>,
-        outboxes: &[Outbox<'_>],
+        outboxes: &(impl Iterator<Item = &'a Outbox<'b>> + Clone),
         slab: usize,
         clip: &VoxelBox,
         mut into: Slab<'_>,
     ) {
-        for outbox in outboxes {
+        for outbox in outboxes.clone() {
             if self.toggles() {
                 outbox.toggle(slab, &mut into);
             } else {
@@ -98,7 +98,7 @@ impl Painter {
             }
         }
         // Strip by strip, so that what is painted is near each other.
-        let strips = (0..STRIPS).flat_map(|strip| outboxes.iter().map(move |outbox| outbox.triangles(slab, strip)));
+        let strips = (0..STRIPS).flat_map(|strip| outboxes.clone().map(move |outbox| outbox.triangles(slab, strip)));
         let pieces = strips.map(|numbers| Selected::listed(mesh, numbers));
         match self.mode {
             Mode::Conservative => not_tiny(self.level, &Conservative, pieces, clip, &mut SetRuns(into)),

@@ -1,6 +1,6 @@
 //! Where the kernel's runs go: bits of a slab of columns.
 
-use fearless_simd::{Simd, i32x16, prelude::*};
+use fearless_simd::{Simd, i32x16, i64x8, prelude::*};
 
 use super::filter::Voxels;
 use super::rows::Tile;
@@ -41,56 +41,68 @@ pub(super) trait Sink {
 
 /// Receives cubes of voxels too, several at once.
 pub(super) trait CubeSink: Sink {
+    /// Where cubes go.
+    type Places<V: Simd>;
+
     /// Looks up cubes whose low corners are seen from the voxel `base`, and inside the clip along z: long before they are
     /// sent, because vectors take their time to be read lane by lane.
-    fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> Places;
+    fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> Self::Places<V>;
 
     /// Voxels of cubes of `SIDE` in `lanes`: those `(x, y, z)` from the corner whose bit `(SIDE x + y) SIDE + z` is set, all
     /// inside the clip.
-    fn cubes<V: Simd, const SIDE: usize>(&mut self, places: &Places, voxels: &Voxels<V>, lanes: Lanes);
+    fn cubes<V: Simd, const SIDE: usize>(&mut self, places: &Self::Places<V>, voxels: &Voxels<V>, lanes: Lanes);
 }
 
-/// Where the low corners of cubes are: along x, and among a piece's words.
-pub(super) struct Places {
+/// Where voxels are among a piece's words.
+pub(super) struct InWords<V: Simd> {
+    /// Along x.
     #[cfg(feature = "threads")]
-    pub(super) x: [i32; LANES],
+    pub(super) x: i32x16<V>,
     /// Outside the piece: past its end, below 0, or a word for which no bit will be set.
-    words: [[i64; LANES / 2]; 2],
-    shifts: [i32; LANES],
+    pub(super) words: [i64x8<V>; 2],
+    pub(super) shifts: i32x16<V>,
 }
 
-impl Places {
-    /// Corners seen from `base`, in a piece that starts at a voxel, for its columns along y and the words of a column.
+impl<V: Simd> InWords<V> {
+    /// Voxels seen from `base`, in a piece that starts at a voxel, for its columns along y and the words of a column.
     #[inline(always)]
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_possible_wrap,
         reason = "all in or near a grid, of at most 2^15 voxels along an axis"
     )]
-    pub(super) fn new<V: Simd>(
-        low: &[i32x16<V>; 3],
+    pub(super) fn new(
+        voxels: &[i32x16<V>; 3],
         base: [i64; 3],
         start: [i64; 3],
         columns: usize,
         column_words: usize,
     ) -> Self {
         let move_by = |i: usize| (base[i] - start[i]) as i32;
-        let at = [low[0] + move_by(0), low[1] + move_by(1), low[2] + move_by(2)];
+        let at = [voxels[0] + move_by(0), voxels[1] + move_by(1), voxels[2] + move_by(2)];
         let column = at[0] * columns as i32 + at[1];
         let (first, second) = column.widening_mul(column_words as i32);
         let (above_first, above_second) = (at[2] >> WORD_SHIFT).widen();
         Self {
             #[cfg(feature = "threads")]
-            x: *at[0],
-            words: [*(first + above_first), *(second + above_second)],
-            shifts: *(at[2] & (WORD_BITS as i32 - 1)),
+            x: at[0],
+            words: [first + above_first, second + above_second],
+            shifts: at[2] & (WORD_BITS as i32 - 1),
         }
     }
+}
 
+/// Where the low corners of cubes are among a piece's words, lane by lane.
+pub(super) struct Places {
+    words: [[i64; LANES / 2]; 2],
+    shifts: [i32; LANES],
+}
+
+impl Places {
     /// The word and the shift of a lane.
     #[inline(always)]
     #[expect(clippy::cast_sign_loss, clippy::cast_possible_truncation, reason = "of a word")]
-    pub(super) fn of(&self, lane: usize) -> (isize, u32) {
+    fn of(&self, lane: usize) -> (isize, u32) {
         (self.words.as_flattened()[lane % LANES] as isize, self.shifts[lane % LANES] as u32)
     }
 }
@@ -269,9 +281,12 @@ fn for_each_column(mut columns: u64, mut each: impl FnMut(usize)) {
 }
 
 impl CubeSink for SetRuns<'_> {
+    type Places<V: Simd> = Places;
+
     #[inline(always)]
     fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> Places {
-        Places::new(low, base, self.0.start, self.0.columns, self.0.column_words)
+        let InWords { words, shifts, .. } = InWords::new(low, base, self.0.start, self.0.columns, self.0.column_words);
+        Places { words: [*words[0], *words[1]], shifts: *shifts }
     }
 
     #[inline(always)]

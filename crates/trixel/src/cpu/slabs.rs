@@ -36,7 +36,7 @@ pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut V
             && parallel::weight_at_least(mesh, volume, WORTH_THREADS)
         {
             let parts = parallel::Parts::new(triangles, threads);
-            if parallel::copies_are_small(mesh, volume, threads) {
+            if parallel::copies_are_small(painter, mesh, volume, threads) {
                 parallel::voxelize_in_copies(painter, mesh, volume, &parts, spare);
             } else {
                 parallel::voxelize_in_slabs(painter, mesh, volume, &parts, spare);
@@ -63,12 +63,13 @@ fn clip_of(volume_dims: [u32; 3], x_range: std::ops::Range<u32>) -> VoxelBox {
 #[cfg(feature = "threads")]
 mod parallel {
     use std::ops::{Range, RangeInclusive};
-    use std::sync::Mutex;
     use std::sync::atomic::{AtomicU64, Ordering};
+    use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
     use rayon::prelude::*;
 
     use super::{LatticeMesh, Painter, Selected, Slab, Spare, VoxelBox, clip_of, prefix_xor};
+    use crate::cpu::gate::Gate;
     use crate::cpu::outbox::{Compartment, Cuts, Outbox};
     use crate::cpu::triangles::corners;
     use crate::volume::Volume;
@@ -78,8 +79,8 @@ mod parallel {
     /// Pieces of the triangles a thread, within limits of triangles.
     const PIECES: u64 = 64;
     const PIECE: RangeInclusive<u64> = 1 << 8..=1 << 11;
-    /// Layers of the grid a thread, when copies are put together.
-    const LAYERS: usize = 8;
+    /// Pieces of the grid a thread, when copies are put together.
+    const PIECES_OF_GRID: usize = 8;
     /// Triangles that are looked at to cut the grid.
     const SAMPLES: usize = 1 << 11;
 
@@ -91,11 +92,9 @@ mod parallel {
         outboxes: Vec<Vec<Compartment>>,
     }
 
-    impl Spare {
-        fn lock(&self) -> std::sync::MutexGuard<'_, Kept> {
-            // Nobody panics while holding it.
-            self.kept.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
-        }
+    /// Nobody panics while holding a lock.
+    fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+        mutex.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The range of x that a triangle's box meets inside the grid, and the work that it stands for.
@@ -139,10 +138,14 @@ mod parallel {
         size: u64,
     }
 
+    fn packed(start: u64, end: u64) -> u64 {
+        end << 32 | start
+    }
+
     impl Parts {
         pub(super) fn new(triangles: u32, threads: usize) -> Self {
             let (all, parts) = (u64::from(triangles), threads as u64);
-            let left = (0..parts).map(|i| AtomicU64::new((all * (i + 1) / parts) << 32 | all * i / parts)).collect();
+            let left = (0..parts).map(|i| AtomicU64::new(packed(all * i / parts, all * (i + 1) / parts))).collect();
             Self { left, size: (all / (parts * PIECES)).clamp(*PIECE.start(), *PIECE.end()) }
         }
 
@@ -168,7 +171,7 @@ mod parallel {
             let left = self.left[part].fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
                 let Range { start, end } = split(left);
                 let size = self.size.min(end.saturating_sub(start));
-                (size > 0).then(|| if from_end { (end - size) << 32 | start } else { end << 32 | start + size })
+                (size > 0).then(|| if from_end { packed(start, end - size) } else { packed(start + size, end) })
             });
             let Range { start, end } = split(left.ok()?);
             let size = self.size.min(end - start);
@@ -185,17 +188,17 @@ mod parallel {
     }
 
     /// Whether grids of their own for all threads cost less than sorting the triangles: measured, they do as long as they
-    /// fit the cache that threads share, and are not large beside the mesh.
-    pub(super) fn copies_are_small(mesh: &LatticeMesh<'_>, volume: &Volume, threads: usize) -> bool {
+    /// about fit the cache that threads share, and are not large beside the mesh. Toggles are as quickly sorted.
+    pub(super) fn copies_are_small(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &Volume, threads: usize) -> bool {
         /// 32 MiB, and so few in tests that some grids are larger.
         const MOST_WORDS: usize = if cfg!(test) { 1 << 16 } else { 4 << 20 };
         /// For each triangle.
         const WORDS: usize = 16;
         let words = volume.words().len().saturating_mul(threads);
-        words <= MOST_WORDS && words / WORDS <= mesh.triangles.len()
+        !painter.toggles() && words <= MOST_WORDS && words / WORDS <= mesh.triangles.len()
     }
 
-    /// Every thread paints into a grid of its own.
+    /// Every thread paints a grid of its own: the first one the volume. Then pieces of it get what is in the others.
     pub(super) fn voxelize_in_copies(
         painter: &Painter,
         mesh: &LatticeMesh<'_>,
@@ -203,66 +206,81 @@ mod parallel {
         parts: &Parts,
         spare: &Spare,
     ) {
-        let dims = volume.grid().dims();
+        let (dims, threads) = (volume.grid().dims(), parts.count());
         let (columns, column_words) = (dims[1] as usize, volume.column_words());
         let clean = volume.is_pristine();
         let words = volume.words_mut();
         let length = words.len();
-        let mut copies = std::mem::take(&mut spare.lock().copies);
-        let threads = parts.count();
-        copies.resize_with(threads - 1, Vec::new);
+        // Whole layers, as many as leave each thread several pieces.
+        let piece = columns * column_words * (dims[0] as usize).div_ceil(threads * PIECES_OF_GRID);
         let grid = clip_of(dims, 0..dims[0]);
         let paint = |i: usize, words: &mut [u64]| {
             let slab = Slab { words, start: [0; 3], columns, column_words };
             painter.paint(mesh, parts.pieces(mesh, i), &grid, slab);
         };
+        let mut kept = std::mem::take(&mut lock(&spare.kept).copies);
+        kept.resize_with(threads - 1, Vec::new);
+        // Cut into pieces too.
+        let copies: Vec<OnceLock<Vec<Mutex<&mut [u64]>>>> = kept.iter().map(|_| OnceLock::new()).collect();
+        // For whoever comes first, once the first thread is done with the volume.
+        let pieces = Mutex::new([].chunks_mut(piece).enumerate());
+        let next = || lock(&pieces).next();
+        let gate = Gate::new();
+        let join = || {
+            while let Some((i, words)) = next() {
+                for copy in copies.iter().filter_map(OnceLock::get) {
+                    move_voxels(&mut lock(&copy[i]), words);
+                }
+            }
+        };
         rayon::scope(|scope| {
-            for (i, copy) in (1..).zip(&mut copies) {
-                let paint = &paint;
+            for ((i, kept), copy) in (1..).zip(&mut kept).zip(&copies) {
+                let (gate, join, paint) = (&gate, &join, &paint);
                 scope.spawn(move |_| {
-                    // Whoever comes too late needs none.
-                    if !parts.all_taken() {
-                        if copy.len() < length {
-                            *copy = vec![0; length];
+                    gate.pass(|| {
+                        // Whoever comes too late needs none.
+                        if !parts.all_taken() {
+                            if kept.len() < length {
+                                *kept = vec![0; length];
+                            }
+                            paint(i, &mut kept[..length]);
+                            // Nobody else sets it.
+                            let _ = copy.set(kept[..length].chunks_mut(piece).map(Mutex::new).collect());
                         }
-                        paint(i, &mut copy[..length]);
-                    }
+                    });
+                    join();
                 });
             }
-            if !clean {
-                words.fill(0);
-            }
-            paint(0, words);
+            let mut words = Some(words);
+            let mut begin = |with_triangles: bool| {
+                if let Some(words) = words.take() {
+                    if !clean {
+                        words.fill(0);
+                    }
+                    if with_triangles {
+                        paint(0, words);
+                    }
+                    *lock(&pieces) = words.chunks_mut(piece).enumerate();
+                }
+            };
+            gate.pass(|| begin(true));
+            // If the others were quicker.
+            begin(false);
+            join();
         });
-        // Whole layers, as many as leave each thread several pieces.
-        let piece = columns * column_words * (dims[0] as usize).div_ceil(threads * LAYERS);
-        let mut pieces: Vec<_> = words.chunks_mut(piece).map(|words| (words, Vec::new())).collect();
-        for copy in copies.iter_mut().filter(|copy| !copy.is_empty()) {
-            for ((_, from), copy) in pieces.iter_mut().zip(copy[..length].chunks_mut(piece)) {
-                from.push(copy);
-            }
-        }
-        pieces.into_par_iter().with_max_len(1).for_each(|(words, from)| {
-            for copy in from {
-                move_voxels(copy, words, painter.toggles());
-            }
-            if painter.toggles() {
-                prefix_xor(words, column_words, dims[2]);
-            }
-        });
-        spare.lock().copies = copies;
+        lock(&spare.kept).copies = kept;
     }
 
-    /// Moves the voxels or toggles of a copy, most of whose words have none.
-    fn move_voxels(from: &mut [u64], to: &mut [u64], toggles: bool) {
+    /// Moves the voxels of a copy, most of whose words have none.
+    fn move_voxels(from: &mut [u64], to: &mut [u64]) {
         /// A cache line.
         const LINE: usize = 8;
         for (to, from) in to.chunks_mut(LINE).zip(from.chunks_mut(LINE)) {
             if from.iter().fold(0, |all, word| all | word) != 0 {
                 for (to, from) in to.iter_mut().zip(&mut *from) {
-                    *to = if toggles { *to ^ *from } else { *to | *from };
+                    *to |= *from;
+                    *from = 0;
                 }
-                from.fill(0);
             }
         }
     }
@@ -278,38 +296,47 @@ mod parallel {
         let dims = volume.grid().dims();
         let threads = parts.count();
         let cuts = Cuts::new(cut(mesh, dims, threads), dims[1] as usize, volume.column_words());
-        let mut kept = std::mem::take(&mut spare.lock().outboxes);
+        let mut kept = std::mem::take(&mut lock(&spare.kept).outboxes);
         kept.resize_with(threads, Vec::new);
-        let mut outboxes: Vec<_> = kept.into_iter().map(|kept| Outbox::new(&cuts, kept)).collect();
         let mut clean = volume.is_pristine();
         let words = volume.words_mut();
         let grid = clip_of(dims, 0..dims[0]);
         loop {
-            outboxes.par_iter_mut().with_max_len(1).enumerate().for_each(|(i, outbox)| {
-                outbox.clear();
-                painter.sort(mesh, parts.pieces(mesh, i), &grid, outbox);
-            });
-            let last = parts.all_taken();
+            let gate = Gate::new();
+            let sorted: Vec<OnceLock<Outbox<'_>>> = kept.iter().map(|_| OnceLock::new()).collect();
             // For whoever comes first, one after the other: the largest are at the beginning.
             let slabs = Mutex::new(cuts.slabs(words).into_iter().enumerate());
-            let next = || slabs.lock().unwrap_or_else(std::sync::PoisonError::into_inner).next();
-            (0..threads).into_par_iter().with_max_len(1).for_each(|_| {
+            let next = || lock(&slabs).next();
+            kept.par_iter_mut().with_max_len(1).enumerate().for_each(|(i, kept)| {
+                gate.pass(|| {
+                    let mut outbox = Outbox::new(&cuts, std::mem::take(kept));
+                    painter.sort(mesh, parts.pieces(mesh, i), &grid, &mut outbox);
+                    // Nobody else sets it.
+                    let _ = sorted[i].set(outbox);
+                });
+                let last = parts.all_taken();
                 while let Some((i, mut slab)) = next() {
                     if !clean {
                         slab.words.fill(0);
                     }
+                    let outboxes = sorted.iter().filter_map(OnceLock::get);
                     painter.paint_sorted(mesh, &outboxes, i, &clip_of(dims, cuts.x(i)), slab.reborrow());
                     if last && painter.toggles() {
                         prefix_xor(slab.words, slab.column_words, dims[2]);
                     }
                 }
             });
-            if last {
+            for (kept, sorted) in kept.iter_mut().zip(sorted) {
+                if let Some(outbox) = sorted.into_inner() {
+                    *kept = outbox.into_compartments();
+                }
+            }
+            if parts.all_taken() {
                 break;
             }
             clean = true;
         }
-        spare.lock().outboxes = outboxes.into_iter().map(Outbox::into_compartments).collect();
+        lock(&spare.kept).outboxes = kept;
     }
 
     /// Where to cut x, into slabs that hold ever less work, so that threads are done at about the same time; first 0, last nx.
@@ -358,24 +385,20 @@ mod parallel {
     }
 }
 
-#[cfg(all(test, feature = "threads"))]
+#[cfg(feature = "threads")]
+#[cfg(test)]
 mod tests {
     use crate::cpu::CpuBackend;
     use crate::lattice::LatticeMesh;
     use crate::{Backend, Grid, Job, Mode, Volume, scene};
 
-    /// Outboxes fill up several times, and every grid is cut through tiny triangles; small grids are copied, into memory
-    /// that was used for others.
-    #[test]
-    fn threads_paint_what_one_thread_does() {
+    fn threads_give_what_one_does(name: &str, grid: Grid) {
+        let mesh = scene::build(name).unwrap();
+        let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
         let backends = [1, 7].map(|threads| CpuBackend::with_threads(threads).unwrap());
-        for (name, resolution) in
-            [("sphere:48", 33), ("room", 70), ("sphere:48", 90), ("sphere:48", 40), ("sphere:48", 30)]
-        {
-            let mesh = scene::build(name).unwrap();
-            let grid = Grid::fit(&mesh.bounds().unwrap(), resolution).unwrap();
-            let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
-            for mode in Mode::ALL {
+        for mode in Mode::ALL {
+            // The second time in memory that was used before.
+            for _ in 0..2 {
                 let [one, seven] = backends.each_ref().map(|backend| {
                     let mut volume = Volume::new(grid).unwrap();
                     // What was there before does not matter.
@@ -383,7 +406,37 @@ mod tests {
                     backend.voxelize(&lattice, &Job::new(grid, mode), &mut volume).unwrap();
                     volume
                 });
-                assert!(one == seven, "{name}, {mode}, {resolution}");
+                assert!(one == seven, "{name}, {mode}, {:?}", grid.dims());
+            }
+        }
+    }
+
+    /// Outboxes fill up several times, and every grid is cut through tiny triangles; small grids are copied.
+    #[test]
+    fn threads_paint_what_one_thread_does() {
+        for (name, resolution) in
+            [("sphere:48", 33), ("room", 70), ("sphere:48", 90), ("sphere:48", 40), ("sphere:48", 30)]
+        {
+            let bounds = scene::build(name).unwrap().bounds().unwrap();
+            threads_give_what_one_does(name, Grid::fit(&bounds, resolution).unwrap());
+        }
+    }
+
+    /// Cubes of voxels begin before the first column, by more than a layer has.
+    #[test]
+    fn threads_paint_grids_of_few_columns() {
+        for (dims, copied) in
+            [([30, 1, 60], true), ([30, 2, 600], false), ([2, 300, 600], false), ([300, 3, 9000], false)]
+        {
+            let name = if copied { "sphere:48" } else { "sphere:24" };
+            let bounds = scene::build(name).unwrap().bounds().unwrap();
+            for voxels in [20.0, 90.0] {
+                let size = (bounds.max[0] - bounds.min[0]) / voxels;
+                // Through the middle, where the surface is steep, and at the side, where it is flat.
+                for at in [0.5, 0.02] {
+                    let origin = [bounds.min[0], bounds.min[1] + at * voxels * size, bounds.min[2]];
+                    threads_give_what_one_does(name, Grid::new(origin, [size; 3], dims).unwrap());
+                }
             }
         }
     }

@@ -11,7 +11,7 @@ use super::kernel::NearClip;
 use super::octants;
 use super::rule::SurfaceRule;
 use super::sink::CubeSink;
-use super::triangles::{LANES, Lanes, Queue, Vectors};
+use super::triangles::{LANES, Lanes, Queue, Stored, Vectors};
 use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
 
 /// Lanes of a vector of f64.
@@ -110,35 +110,33 @@ pub(super) fn flush<V: Simd, R: SurfaceRule, const SIDE: usize>(
         if count == 0 {
             break;
         }
-        cubes::<_, _, SIDE>(simd, rule, waiting, first, count, clip, sink);
+        send_cubes::<_, _, SIDE>(simd, rule, &waiting.vectors(simd, first), used(count), clip, sink);
         first += LANES;
     }
     waiting.keep(simd, first);
 }
 
-/// [`flush`] of `count` of the lanes from `first` on.
+/// [`flush`] of the triangles in `lanes`.
 #[inline(always)]
-fn cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
+pub(super) fn send_cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
     rule: &R,
-    waiting: &Queue,
-    first: usize,
-    count: usize,
+    corners: &Vectors<V>,
+    lanes: Lanes,
     clip: &NearClip<V>,
     sink: &mut impl CubeSink,
 ) {
-    let corners = waiting.vectors(simd, first);
-    let boxes = Boxes::new(simd, &corners);
+    let boxes = Boxes::new(simd, corners);
     let places = sink.places(&boxes.low, clip.base);
     let middle = half_voxels(&boxes.low, SIDE);
     let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
     let Filtered { mut voxels, doubtful } =
         filter::cubes::<_, _, SIDE>(simd, rule, &corners.floats(middle, PER_HALF), longest);
-    if doubtful & used(count) != 0 {
-        voxels = exact_cubes::<_, _, SIDE>(simd, rule, waiting, first);
+    if doubtful & lanes != 0 {
+        voxels = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
     }
     boxes.keep::<SIDE>(simd, clip, &mut voxels);
-    sink.cubes::<_, SIDE>(&places, &voxels, used(count));
+    sink.cubes::<_, SIDE>(&places, &voxels, lanes);
 }
 
 /// Sends the voxels of the triangles in `lanes`, whose boxes have at most two voxels along each axis.
@@ -233,7 +231,7 @@ fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
     let Filtered { mut voxels, doubtful } = filter::layers::<_, _, SIDE>(simd, rule, &layer, longest);
     if doubtful & used(count) != 0 {
-        voxels = exact_cubes::<_, _, SIDE>(simd, rule, waiting, first);
+        voxels = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
     } else if SIDE == 3 {
         voxels[0] = spread_three(voxels[0], along_x, along_z);
     } else {
@@ -295,16 +293,11 @@ fn spread_four<V: Simd>(simd: V, cells: i32x16<V>, along_x: mask32x16<V>, along_
 
 /// The voxels of cubes of `SIDE`, without rounding.
 #[inline(never)]
-fn exact_cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
-    simd: V,
-    rule: &R,
-    waiting: &Queue,
-    first: usize,
-) -> Voxels<V> {
+fn exact_cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(simd: V, rule: &R, corners: &Stored) -> Voxels<V> {
     simd.vectorize(
         #[inline(always)]
         || {
-            let corners = waiting.vectors(simd, first);
+            let corners = corners.vectors(simd, 0);
             let boxes = Boxes::new(simd, &corners);
             let low = [boxes.low[0] << STEP_BITS, boxes.low[1] << STEP_BITS, boxes.low[2] << STEP_BITS];
             let halves = corners.halves(simd, low, 1.0);
@@ -514,9 +507,7 @@ mod tests {
             let mut clip = || i32x16::splat(simd, i32::try_from(random.range(0, 1)).unwrap());
             let (zero, one) = (i32x16::splat(simd, 0), i32x16::splat(simd, 1));
             let clip = NearClip { base: [0; 3], low: [clip(), zero, zero], high: [one, clip(), one] };
-            let mut queue = Queue::EMPTY;
-            queue.push(simd, &corners, used(LANES));
-            let mut expected = exact_cubes::<_, _, 2>(simd, &Conservative, &queue, 0);
+            let mut expected = exact_cubes::<_, _, 2>(simd, &Conservative, &corners.stored());
             boxes.keep::<2>(simd, &clip, &mut expected);
 
             let (middle, layers) = (half_voxels(&boxes.low, 2), boxes.layers(&clip));

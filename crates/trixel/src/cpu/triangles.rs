@@ -157,7 +157,7 @@ impl Block {
 }
 
 /// Corners of up to `N` triangles in lattice steps, axis by axis: corner k's axis i is row `3 k + i`.
-struct Corners<const N: usize> {
+pub(super) struct Corners<const N: usize> {
     rows: [[i32; N]; 9],
 }
 
@@ -187,10 +187,24 @@ fn row<V: Simd>(simd: V, row: &[i32], first: usize) -> i32x16<V> {
 #[derive(Clone, Copy)]
 pub(super) struct Vectors<V: Simd>(pub(super) [[i32x16<V>; 3]; 3]);
 
+/// One vector's corners in memory, for functions that are called.
+pub(super) type Stored = Corners<LANES>;
+
 /// A triangle's corners in two halves of the lanes, as floats.
 pub(super) type Halves<V> = [[[f64x8<V>; 3]; 3]; 2];
 
 impl<V: Simd> Vectors<V> {
+    #[inline(always)]
+    pub(super) fn stored(&self) -> Stored {
+        let mut rows = Stored::NONE.rows;
+        for k in 0..3 {
+            for i in 0..3 {
+                self.0[k][i].store_slice(&mut rows[3 * k + i]);
+            }
+        }
+        Stored { rows }
+    }
+
     #[inline(always)]
     pub(super) fn least(&self, axis: usize) -> i32x16<V> {
         self.0[0][axis].min(self.0[1][axis]).min(self.0[2][axis])
