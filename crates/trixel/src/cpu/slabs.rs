@@ -1,10 +1,13 @@
 //! How threads share a grid without ever writing the same word.
 //!
-//! One thread paints all of it. More paint a grid each, where those fit a cache, and put them together. Larger
+//! One thread paints all of a small grid. More paint a grid each, where those fit a cache, and put them together. Other
 //! grids are cut along x into slabs of whole columns: threads first take triangles as they come and sort them into slabs: tiny
 //! ones are decided at once, and their voxels kept in an [`outbox`](super::outbox); the others are for every slab that they
-//! meet. Then the slabs are painted, one a thread at a time: nobody waits for memory that another has changed, and what is
-//! painted fits a cache. Slabs hold about the same work each, and there are several a thread to level the rest.
+//! meet. Then the slabs are painted, one a thread at a time, the largest first: nobody waits for memory that another has
+//! changed, and what is painted is near each other, so that one thread gains from it too.
+//!
+//! Each thread begins at a place of its own in the mesh, because triangles that follow each other are mostly near each
+//! other, and helps the others when it is done.
 
 use super::kernel::VoxelBox;
 use super::painter::Painter;
@@ -21,19 +24,15 @@ pub(super) struct Spare {
 }
 
 /// Clears the volume and sets the voxels of the painter's mode.
-#[cfg_attr(not(feature = "threads"), expect(unused_variables, reason = "one thread needs no copies"))]
+#[cfg_attr(not(feature = "threads"), expect(unused_variables, reason = "one thread keeps nothing"))]
 pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume, spare: &Spare) {
-    let dims = volume.grid().dims();
     #[cfg(feature = "threads")]
     {
-        /// Below this many triangles' worth of work, waking threads costs more than it saves.
-        const WORTH_THREADS: u64 = 2000;
         let threads = rayon::current_num_threads();
         // Threads share triangles by 32-bit numbers.
         if let Ok(triangles) = u32::try_from(mesh.triangles.len())
-            && threads > 1
-            && dims[0] > 1
-            && parallel::weight_at_least(mesh, volume, WORTH_THREADS)
+            && volume.grid().dims()[0] > 1
+            && parallel::pays(painter, mesh, volume, threads)
         {
             let parts = parallel::Parts::new(triangles, threads);
             if parallel::copies_are_small(painter, mesh, volume, threads) {
@@ -44,6 +43,12 @@ pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut V
             return;
         }
     }
+    voxelize_at_once(painter, mesh, volume);
+}
+
+/// One thread, one triangle after the other.
+fn voxelize_at_once(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume) {
+    let dims = volume.grid().dims();
     let (columns, column_words) = (dims[1] as usize, volume.column_words());
     volume.clear();
     let mut slab = Slab { words: volume.words_mut(), start: [0; 3], columns, column_words };
@@ -114,7 +119,7 @@ mod parallel {
         8 + u64::try_from(columns).unwrap_or(0)
     }
 
-    pub(super) fn weight_at_least(mesh: &LatticeMesh<'_>, volume: &Volume, limit: u64) -> bool {
+    fn weight_at_least(mesh: &LatticeMesh<'_>, volume: &Volume, limit: u64) -> bool {
         let [nx, ny, _] = volume.grid().dims().map(i64::from);
         let mut total = 0;
         for &triangle in mesh.triangles {
@@ -187,15 +192,31 @@ mod parallel {
         }
     }
 
+    /// What about fits the cache that threads share: 32 MiB, and so little in tests that some grids are larger.
+    const CACHE_WORDS: usize = if cfg!(test) { 1 << 16 } else { 4 << 20 };
+    /// Words for each triangle up to which a grid is small beside the mesh.
+    const WORDS: usize = 16;
+
+    /// Whether to do anything but voxelize at once.
+    pub(super) fn pays(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &Volume, threads: usize) -> bool {
+        /// Below this many triangles' worth of work, waking threads costs more than it saves.
+        const WORTH_THREADS: u64 = 2000;
+        /// One thread paints slabs for the sake of the cache if there are some triangles in each. It pays most where
+        /// painting is most of the work: for large triangles, and for parity.
+        const WORTH_SLABS: usize = 1000;
+        let (words, triangles) = (volume.words().len(), mesh.triangles.len());
+        if threads == 1 {
+            words > CACHE_WORDS && triangles >= WORTH_SLABS && (painter.toggles() || words / WORDS > triangles)
+        } else {
+            weight_at_least(mesh, volume, WORTH_THREADS)
+        }
+    }
+
     /// Whether grids of their own for all threads cost less than sorting the triangles: measured, they do as long as they
     /// about fit the cache that threads share, and are not large beside the mesh. Toggles are as quickly sorted.
     pub(super) fn copies_are_small(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &Volume, threads: usize) -> bool {
-        /// 32 MiB, and so few in tests that some grids are larger.
-        const MOST_WORDS: usize = if cfg!(test) { 1 << 16 } else { 4 << 20 };
-        /// For each triangle.
-        const WORDS: usize = 16;
         let words = volume.words().len().saturating_mul(threads);
-        !painter.toggles() && words <= MOST_WORDS && words / WORDS <= mesh.triangles.len()
+        threads > 1 && !painter.toggles() && words <= CACHE_WORDS && words / WORDS <= mesh.triangles.len()
     }
 
     /// Every thread paints a grid of its own: the first one the volume. Then pieces of it get what is in the others.
@@ -388,25 +409,25 @@ mod parallel {
 #[cfg(feature = "threads")]
 #[cfg(test)]
 mod tests {
-    use crate::cpu::CpuBackend;
-    use crate::lattice::LatticeMesh;
-    use crate::{Backend, Grid, Job, Mode, Volume, scene};
+    use super::*;
+    use crate::cpu::{CpuBackend, Instructions};
+    use crate::{Backend, Grid, Job, Mode, scene};
 
     fn threads_give_what_one_does(name: &str, grid: Grid) {
         let mesh = scene::build(name).unwrap();
         let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
         let backends = [1, 7].map(|threads| CpuBackend::with_threads(threads).unwrap());
         for mode in Mode::ALL {
+            let job = Job::new(grid, mode);
+            let mut expected = Volume::new(grid).unwrap();
+            voxelize_at_once(&Painter::new(Instructions::Best.level(), &job), &lattice, &mut expected);
             // The second time in memory that was used before.
-            for _ in 0..2 {
-                let [one, seven] = backends.each_ref().map(|backend| {
-                    let mut volume = Volume::new(grid).unwrap();
-                    // What was there before does not matter.
-                    volume.words_mut().fill(u64::MAX);
-                    backend.voxelize(&lattice, &Job::new(grid, mode), &mut volume).unwrap();
-                    volume
-                });
-                assert!(one == seven, "{name}, {mode}, {:?}", grid.dims());
+            for backend in backends.iter().chain(&backends) {
+                let mut volume = Volume::new(grid).unwrap();
+                // What was there before does not matter.
+                volume.words_mut().fill(u64::MAX);
+                backend.voxelize(&lattice, &job, &mut volume).unwrap();
+                assert!(volume == expected, "{name}, {mode}, {:?}, {} threads", grid.dims(), backend.threads());
             }
         }
     }
@@ -414,9 +435,14 @@ mod tests {
     /// Outboxes fill up several times, and every grid is cut through tiny triangles; small grids are copied.
     #[test]
     fn threads_paint_what_one_thread_does() {
-        for (name, resolution) in
-            [("sphere:48", 33), ("room", 70), ("sphere:48", 90), ("sphere:48", 40), ("sphere:48", 30)]
-        {
+        for (name, resolution) in [
+            ("sphere:48", 33),
+            ("room", 70),
+            ("sphere:48", 90),
+            ("sphere:48", 40),
+            ("sphere:48", 30),
+            ("sphere:8", 256),
+        ] {
             let bounds = scene::build(name).unwrap().bounds().unwrap();
             threads_give_what_one_does(name, Grid::fit(&bounds, resolution).unwrap());
         }
