@@ -12,7 +12,8 @@
 //! - `sink`: runs into bits, toggles into parity
 //! - `painter`: a mode and the instructions, together
 //! - `triangles`: which triangles, and their corners, alone or as vectors
-//! - `slabs`: a dense grid cut along x, one piece a task, so that threads never share a word
+//! - `slabs`: a dense grid cut along x, one piece a task, so that threads never share a word; `outbox`, `gate`: what it does
+//!   that with
 //! - `pillars`: a sparse grid cut into pillars of bricks
 
 mod crossings;
@@ -53,8 +54,7 @@ use crate::volume::{Volume, VolumeError};
 
 /// Voxelizes on the CPU. The result is the same for any number of threads.
 ///
-/// With several threads it keeps scratch memory between calls, up to 32 MiB and 16 MiB a thread, so use one again rather than
-/// making another.
+/// It keeps scratch memory between calls, up to 32 MiB and 16 MiB a thread, so use one again rather than making another.
 #[derive(Debug, Default)]
 pub struct CpuBackend {
     #[cfg(feature = "threads")]
