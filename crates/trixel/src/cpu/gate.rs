@@ -28,8 +28,10 @@ impl Gate {
         if self.state.fetch_update(Ordering::AcqRel, Ordering::Acquire, enter).is_err() {
             return;
         }
-        first_step();
-        self.state.fetch_sub(1, Ordering::AcqRel);
+        {
+            let _inside = Inside(&self.state);
+            first_step();
+        }
         let mut rounds = 0u32;
         // Whoever finds nobody at the first step opens.
         while let Err(state) = self.state.compare_exchange(0, Self::OPEN, Ordering::AcqRel, Ordering::Acquire)
@@ -42,6 +44,15 @@ impl Gate {
                 std::hint::spin_loop();
             }
         }
+    }
+}
+
+/// A thread in the first step. It leaves even by a panic, for which the others would wait forever.
+struct Inside<'a>(&'a AtomicU32);
+
+impl Drop for Inside<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::AcqRel);
     }
 }
 
@@ -68,6 +79,17 @@ mod tests {
                 }
             });
         }
+    }
+
+    #[test]
+    #[expect(clippy::panic, reason = "what is tested")]
+    fn nobody_waits_for_a_thread_that_panicked() {
+        let gate = Gate::new();
+        let panicked = std::thread::scope(|scope| scope.spawn(|| gate.pass(|| panic!("of the test"))).join());
+        assert!(panicked.is_err());
+        // Would spin for ever if the other still counted.
+        assert_eq!(gate.state.load(Ordering::SeqCst), 0);
+        gate.pass(|| ());
     }
 
     #[test]
