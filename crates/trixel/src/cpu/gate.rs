@@ -82,7 +82,6 @@ mod tests {
     }
 
     #[test]
-    #[expect(clippy::panic, reason = "what is tested")]
     fn nobody_waits_for_a_thread_that_panicked() {
         let gate = Gate::new();
         let panicked = std::thread::scope(|scope| scope.spawn(|| gate.pass(|| panic!("of the test"))).join());
