@@ -191,16 +191,16 @@ impl<'a> Outbox<'a> {
     /// A cube that is not all in one slab, layer by layer.
     #[cold]
     #[inline(never)]
-    #[expect(clippy::cast_possible_wrap, reason = "of a grid")]
-    fn push_layers<const SIDE: usize>(&mut self, mut x: i64, mut word: isize, mut bits: u64, shift: u32) {
+    fn push_layers<const SIDE: usize>(&mut self, mut x: i64, mut place: u64, mut bits: u64) {
         while bits != 0 {
             let here = bits & ((1 << (SIDE * SIDE)) - 1);
             if let Some(slab) = self.cuts.of(x).filter(|_| here != 0) {
-                self.push::<SIDE>(slab, self.place(word, shift), here);
+                self.push::<SIDE>(slab, place, here);
             }
             bits >>= SIDE * SIDE;
             x += 1;
-            word += self.cuts.layer() as isize;
+            // Layers before the grid have places below 0.
+            place = place.wrapping_add((self.cuts.layer() as u64) << SHIFT_BITS);
         }
     }
 }
@@ -261,43 +261,23 @@ impl CubeSink for Outbox<'_> {
 
     #[inline(always)]
     #[expect(
-        clippy::cast_possible_truncation,
         clippy::cast_possible_wrap,
         clippy::cast_sign_loss,
         reason = "places as in `place`; an x below 0 is too large then"
     )]
-    fn cubes<V: Simd, const SIDE: usize>(&mut self, places: &InWords<V>, voxels: &Voxels<V>, mut lanes: Lanes) {
+    fn cubes<V: Simd, const SIDE: usize>(&mut self, at: &InWords<V>, voxels: &Voxels<V>, mut lanes: Lanes) {
         let bias = self.cuts.bias() as i64;
-        let (shifts, bits) = (places.shifts.widen(), voxels[0].widen());
-        let mut entries =
-            [(places.words[0] + bias) << SHIFT_BITS | shifts.0, (places.words[1] + bias) << SHIFT_BITS | shifts.1];
-        if SIDE == 2 {
-            entries = [entries[0] << SMALL_BITS | bits.0, entries[1] << SMALL_BITS | bits.1];
-        }
-        let (x, entries, bits) = (*places.x, [*entries[0], *entries[1]], [*voxels[0], *voxels[1]]);
-        let mut left = 0u64;
+        let (first, second) = at.shifts.widen();
+        let places = [(at.words[0] + bias) << SHIFT_BITS | first, (at.words[1] + bias) << SHIFT_BITS | second];
+        let (x, places, bits) = (*at.x, [*places[0], *places[1]], [*voxels[0], *voxels[1]]);
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LANES;
-            let entry = entries.as_flattened()[lane] as u64;
+            let (place, bits) = (places.as_flattened()[lane] as u64, bits_of::<SIDE>(&bits, lane));
             match self.cuts.of_x.get(x[lane] as u32 as usize) {
-                Some(of_x) if of_x.left >= SIDE as u32 => {
-                    let Compartment { small, cubes, .. } = &mut self.slabs[of_x.slab as usize];
-                    if SIDE == 2 {
-                        small.push(entry);
-                    } else {
-                        cubes.push([bits_of::<SIDE>(&bits, lane), entry << 1 | u64::from(SIDE == 4)]);
-                    }
-                }
-                _ => left |= 1 << lane,
+                Some(of_x) if of_x.left as usize >= SIDE => self.push::<SIDE>(of_x.slab as usize, place, bits),
+                _ => self.push_layers::<SIDE>(i64::from(x[lane]), place, bits),
             }
             lanes &= lanes - 1;
-        }
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize % LANES;
-            let word = [*places.words[0], *places.words[1]].as_flattened()[lane] as isize;
-            let shift = places.shifts[lane] as u32;
-            self.push_layers::<SIDE>(i64::from(x[lane]), word, bits_of::<SIDE>(&bits, lane), shift);
-            left &= left - 1;
         }
     }
 }
