@@ -277,6 +277,12 @@ fn for_each_vector<'a, V: Simd, S: Sink>(
         let mut start = 0;
         while start < triangles.len() {
             let count = triangles.load(start, base, &mut block);
+            if sink.prefetches() {
+                for first in (0..count).step_by(LANES) {
+                    let [low, _] = block.vectors(simd, first).boxes();
+                    sink.prefetch(&low, base);
+                }
+            }
             let mut first = 0;
             while first < count {
                 let lanes = Lanes::MAX >> (64 - (count - first).min(LANES));

@@ -11,6 +11,7 @@
 //! - `number`: exact integers and floor lines
 //! - `sink`: runs into bits, toggles into parity
 //! - `painter`: a mode and the instructions, together
+//! - `prefetch`: memory before it is needed
 //! - `triangles`: which triangles, and their corners, alone or as vectors
 //! - `slabs`: a dense grid cut along x, one piece a task, so that threads never share a word; `outbox`, `gate`: what it does
 //!   that with
@@ -30,6 +31,7 @@ mod octants;
 mod outbox;
 mod painter;
 mod pillars;
+mod prefetch;
 mod rows;
 mod rule;
 mod setup;

@@ -3,6 +3,7 @@
 use fearless_simd::{Simd, i32x16, i64x8, prelude::*};
 
 use super::filter::Voxels;
+use super::prefetch::prefetch;
 use super::rows::Tile;
 use super::triangles::{LANES, Lanes};
 use crate::volume::WORD_BITS;
@@ -31,6 +32,16 @@ pub(super) trait Sink {
     /// Leaves a triangle, of which the number and, of its box inside the clip, the range of x and the least y are given.
     #[inline(always)]
     fn leave(&mut self, _number: usize, _x: [i64; 2], _y: i64) {}
+
+    /// Whether [`Self::prefetch`] is of use.
+    #[inline(always)]
+    fn prefetches(&self) -> bool {
+        false
+    }
+
+    /// Asks for the memory of small cubes, whose low corners are seen from the voxel `base`.
+    #[inline(always)]
+    fn prefetch<V: Simd>(&self, _low: &[i32x16<V>; 3], _base: [i64; 3]) {}
 
     /// Whether it should not be given more for now.
     #[inline(always)]
@@ -222,6 +233,24 @@ const fn side<const SIDE: usize>() -> u32 {
 pub(super) struct SetRuns<'a>(pub(super) Slab<'a>);
 
 impl Sink for SetRuns<'_> {
+    #[inline(always)]
+    fn prefetches(&self) -> bool {
+        /// Words that a core's own caches are about as quick to give: 4 MiB, measured.
+        const NEAR: usize = 1 << 19;
+        self.0.words.len() > NEAR
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an address, whatever it is")]
+    fn prefetch<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) {
+        let InWords { words, .. } = InWords::new(low, base, self.0.start, self.0.columns, self.0.column_words);
+        // The columns beside are near enough.
+        for &at in [*words[0], *words[1]].as_flattened() {
+            prefetch(self.0.words, at as usize);
+            prefetch(self.0.words, (at as usize).wrapping_add(self.0.layer()));
+        }
+    }
+
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
     fn run(&mut self, x: i64, y: i64, from: i64, to: i64) {

@@ -192,8 +192,10 @@ mod parallel {
         }
     }
 
-    /// What about fits the cache that threads share: 32 MiB, and so little in tests that some grids are larger.
+    /// What fits the cache that threads share: 32 MiB, and so little in tests that some grids are larger.
     const CACHE_WORDS: usize = if cfg!(test) { 1 << 16 } else { 4 << 20 };
+    /// What stays in it beside a mesh and the work of others: 8 MiB.
+    const STAYING_WORDS: usize = CACHE_WORDS / 4;
     /// Words for each triangle up to which a grid is small beside the mesh.
     const WORDS: usize = 16;
 
@@ -206,14 +208,14 @@ mod parallel {
         const WORTH_SLABS: usize = 1000;
         let (words, triangles) = (volume.words().len(), mesh.triangles.len());
         if threads == 1 {
-            words > CACHE_WORDS && triangles >= WORTH_SLABS && (painter.toggles() || words / WORDS > triangles)
+            words > STAYING_WORDS && triangles >= WORTH_SLABS && (painter.toggles() || words / WORDS > triangles)
         } else {
             weight_at_least(mesh, volume, WORTH_THREADS)
         }
     }
 
     /// Whether grids of their own for all threads cost less than sorting the triangles: measured, they do as long as they
-    /// about fit the cache that threads share, and are not large beside the mesh. Toggles are as quickly sorted.
+    /// about fit the cache, and are not large beside the mesh. Toggles are as quickly sorted.
     pub(super) fn copies_are_small(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &Volume, threads: usize) -> bool {
         let words = volume.words().len().saturating_mul(threads);
         threads > 1 && !painter.toggles() && words <= CACHE_WORDS && words / WORDS <= mesh.triangles.len()

@@ -5,6 +5,7 @@ use std::ops::Range;
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, prelude::*};
 
 use super::kernel::VoxelBox;
+use super::prefetch::prefetch;
 use crate::lattice::{LatticeMesh, LatticePositions, STEP_BITS};
 
 /// Triangles that are judged together: lanes of a vector of `i32`.
@@ -71,7 +72,12 @@ impl<'a> Selected<'a> {
         let all = &self.mesh.triangles;
         match (&self.mesh.positions, &self.which) {
             (LatticePositions::Narrow(positions), Which::Range(range)) => {
-                let all = &all[range.start + start..range.start + end];
+                let next = range.start + end;
+                prefetch_block(all, next + BLOCK);
+                for &vertex in all[next..all.len().min(next + BLOCK)].as_flattened() {
+                    prefetch(positions, vertex as usize);
+                }
+                let all = &all[range.start + start..next];
                 block.fill(all, |&triangle| triangle, |vertex| positions[vertex as usize]);
             }
             (LatticePositions::Narrow(positions), Which::Listed(numbers)) => {
@@ -96,6 +102,16 @@ impl<'a> Selected<'a> {
             }
         }
         end - start
+    }
+}
+
+/// Asks for a block's triangles.
+#[inline(always)]
+fn prefetch_block(triangles: &[[u32; 3]], start: usize) {
+    /// Triangles in a cache line, rounded down.
+    const LINE: usize = 64 / size_of::<[u32; 3]>();
+    for i in (0..BLOCK).step_by(LINE) {
+        prefetch(triangles, start + i);
     }
 }
 
