@@ -1,5 +1,8 @@
 //! Asking for memory before it is needed, which changes nothing but the time.
 
+/// Whether there is a way to ask.
+pub(super) const POSSIBLE: bool = cfg!(target_arch = "x86_64");
+
 /// Asks for the cache line in which item `i` begins: of an item that is not there, for nothing of use.
 #[inline(always)]
 #[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables, reason = "not asked for elsewhere"))]

@@ -3,7 +3,7 @@
 use fearless_simd::{Simd, i32x16, i64x8, prelude::*};
 
 use super::filter::Voxels;
-use super::prefetch::prefetch;
+use super::prefetch::{self, prefetch};
 use super::rows::Tile;
 use super::triangles::{LANES, Lanes};
 use crate::volume::WORD_BITS;
@@ -237,7 +237,7 @@ impl Sink for SetRuns<'_> {
     fn prefetches(&self) -> bool {
         /// Words that come quickly enough: 5 MiB, measured.
         const NEAR: usize = 5 << 17;
-        self.0.words.len() > NEAR
+        prefetch::POSSIBLE && self.0.words.len() > NEAR
     }
 
     #[inline(always)]
