@@ -177,7 +177,7 @@ impl<V: Simd> Tests<V> {
     pub(super) fn cross<const AXES: usize>(&mut self, e: &[[f32x16<V>; AXES]; 3], i: usize, j: usize) -> f32x16<V> {
         let (p, q) = (e[0][i] * e[1][j], e[0][j] * e[1][i]);
         let n = p - q;
-        self.normal = self.normal.min(n.abs() - (p.abs() + q.abs()) * NORMAL_DOUBT);
+        self.normal = self.normal.min((p.abs() + q.abs()).mul_add(-NORMAL_DOUBT, n.abs()));
         n
     }
 
@@ -193,7 +193,7 @@ impl<V: Simd> Tests<V> {
         let zero = f32x16::splat(simd, 0.0);
         let mut voxels = [i32x16::splat(simd, 0); 2];
         let reach = rule.centre_plane_reach([n[0].abs(), n[1].abs(), n[2].abs()]);
-        let at_middle = n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
+        let at_middle = n[2].mul_add(v[2], n[1].mul_add(v[1], n[0] * v[0]));
         for x in 0..SIDE {
             let at_x = n[0] * centre::<SIDE>(x) - at_middle;
             for y in 0..SIDE {
@@ -229,9 +229,10 @@ impl<V: Simd> Tests<V> {
         let side = f32x16::splat(simd, 1.0).copysign(area);
         let mut least = [[zero; SIDE]; SIDE];
         for k in 0..3 {
+            // Lengths without their sign are the same in another projection, and found once.
+            let reach = rule.centre_reach(e[k][0].abs(), e[k][1].abs()).max(self.edge_doubt);
             let (ea, eb) = (e[k][0] * side, e[k][1] * side);
-            let reach = rule.centre_reach(ea.abs(), eb.abs()).max(self.edge_doubt);
-            let at_middle = eb * v[k][0] + reach - ea * v[k][1];
+            let at_middle = (-ea).mul_add(v[k][1], eb.mul_add(v[k][0], reach));
             for a in 0..SIDE {
                 let at_a = at_middle - eb * centre::<SIDE>(a);
                 for b in 0..SIDE {

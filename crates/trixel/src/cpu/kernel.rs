@@ -296,7 +296,7 @@ fn for_each_vector<'a, V: Simd, S: Sink>(
 
 /// The numbers of the bits that are set, ascending.
 #[inline(always)]
-fn set_bits(mut mask: u64) -> impl Iterator<Item = usize> {
+pub(super) fn set_bits(mut mask: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let bit = (mask != 0).then_some(mask.trailing_zeros() as usize);
         mask &= mask.wrapping_sub(1);
@@ -493,6 +493,6 @@ fn by_size<V: Simd, R: Rule>(
             || rows::voxelize(simd, rule, triangle, around, clipped, sink, &mut scratch.rows),
         );
     } else {
-        large::voxelize(rule, triangle, around, clipped, sink, &mut scratch.large);
+        large::voxelize(simd.level(), rule, triangle, around, clipped, sink, &mut scratch.large);
     }
 }

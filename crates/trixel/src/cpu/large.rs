@@ -5,11 +5,14 @@
 //! contain z, of which one depends on x alone and the other on y alone. This is [HCV] section 3.1 (optimization steps 1
 //! to 5) with the loop over depth replaced by its closed form; cost follows columns, not voxels.
 
-use super::kernel::VoxelBox;
+use fearless_simd::Level;
+
+use super::kernel::{VoxelBox, set_bits};
 use super::number::{FloorLine, Int, MEDIUM_EXTENT};
 use super::rule::Rule;
 use super::setup::{Constraint, Setup};
 use super::sink::Sink;
+use super::slanted::{COLUMNS, Ranges, Runs, Slanted};
 
 /// One bound on b that follows a: `low` (b at least) or not (b at most).
 #[derive(Clone, Copy)]
@@ -82,7 +85,8 @@ impl<T: Int> Bounds<T> {
 #[derive(Default)]
 pub(super) struct Scratch {
     /// For each y of the triangle's box, the z range that the yz projection allows.
-    z_by_y: Vec<[i64; 2]>,
+    z_by_y: Ranges,
+    runs: Runs,
 }
 
 /// Sends the voxels of a triangle of any size inside `clipped` to the sink.
@@ -90,6 +94,7 @@ pub(super) struct Scratch {
 /// Out of line: rare, and its 128-bit code would crowd the common paths.
 #[inline(never)]
 pub(super) fn voxelize<R: Rule>(
+    level: Level,
     rule: &R,
     triangle: &[[i64; 3]; 3],
     around: &VoxelBox,
@@ -99,15 +104,16 @@ pub(super) fn voxelize<R: Rule>(
 ) {
     let extent = around.extent();
     if extent[0].max(extent[1]).max(extent[2]) <= MEDIUM_EXTENT && rule.fits_small() {
-        runs::<i64, _>(rule, triangle, around.low, clipped, sink, scratch);
+        runs::<i64, _>(level, rule, triangle, around.low, clipped, sink, scratch);
     } else {
-        runs::<i128, _>(rule, triangle, around.low, clipped, sink, scratch);
+        runs::<i128, _>(level, rule, triangle, around.low, clipped, sink, scratch);
     }
 }
 
 /// [`voxelize`], following lines in integers that hold what is said at [`MEDIUM_EXTENT`].
 #[inline(always)]
 fn runs<T: Int, R: Rule>(
+    level: Level,
     rule: &R,
     triangle: &[[i64; 3]; 3],
     base: [i64; 3],
@@ -158,63 +164,77 @@ fn runs<T: Int, R: Rule>(
         y_by_x.push(Constraint { na: -up[0], nb: -up[1], t: -d2 }.bound(x_low));
     }
 
+    let Scratch { z_by_y, runs } = scratch;
     let mut z_by_x = Bounds::new();
+    let mut bounds = Bounds::new();
     if R::SURFACE {
-        let mut z_by_y = Bounds::new();
         for constraint in setup.projection(rule, 1, 2) {
-            z_by_y.push(Constraint::<T>::narrowed(constraint).bound(low[1]));
+            bounds.push(Constraint::<T>::narrowed(constraint).bound(low[1]));
         }
         for constraint in setup.projection(rule, 0, 2) {
             z_by_x.push(Constraint::<T>::narrowed(constraint).bound(x_low));
         }
-        scratch.z_by_y.clear();
-        scratch.z_by_y.extend((low[1]..=high[1]).map(|_| z_by_y.next([low[2], high[2]])));
     }
+    z_by_y.fill(to_index(high[1] - low[1]) + 1, std::iter::repeat_with(|| bounds.next([low[2], high[2]])));
 
-    if slanted {
-        // z <= floor((d2 - N_x x - N_y y) / N_z), and the lower bound is `thickness` below it.
-        let (thickness, thickness_rest) = (d2 - d1).div_floor(up[2]);
-        let mut top = FloorLine::new(zero, -up[1], up[2]);
-        let mut at_row = d2 - up[0] * T::from(x_low);
+    if !slanted {
         for x in x_low..=x_high {
             let [y_low, y_high] = y_by_x.next([low[1], high[1]]);
-            let [z_low, z_high] = z_by_x.next([low[2], high[2]]);
-            if y_low <= y_high && z_low <= z_high {
-                top.restart(at_row - up[1] * T::from(y_low));
+            let z = z_by_x.next([low[2], high[2]]);
+            for y in y_low..=y_high {
+                let [from, to] = z_by_y.within(to_index(y - low[1]), z);
+                if from <= to {
+                    sink.run(x + base[0], y + base[1], from + base[2], to + base[2]);
+                }
+            }
+        }
+        return;
+    }
+    // z <= floor((d2 - N_x x - N_y y) / N_z).
+    let mut at_row = d2 - up[0] * T::from(x_low);
+    let mut slanted = Slanted::new(up, [d1, d2], [high[0], high[1]]);
+    // The lower bound is `thickness` below it.
+    let (thickness, thickness_rest) = (d2 - d1).div_floor(up[2]);
+    let mut top = FloorLine::new(zero, -up[1], up[2]);
+    for x in x_low..=x_high {
+        let [y_low, y_high] = y_by_x.next([low[1], high[1]]);
+        let z = z_by_x.next([low[2], high[2]]);
+        if y_low <= y_high && z[0] <= z[1] {
+            let start = at_row - up[1] * T::from(y_low);
+            if let Some(slanted) = &mut slanted {
+                slanted.start(start, up[2]);
+                let mut first = y_low;
+                while first <= y_high {
+                    let columns = to_index(first - low[1])..to_index(y_high - low[1]) + 1;
+                    let set = slanted.next(level, z_by_y, columns, z, R::TO_TOP, runs);
+                    for i in set_bits(set) {
+                        let (from, to) = (runs.starts[i % COLUMNS], runs.ends[i % COLUMNS]);
+                        sink.run(x + base[0], first + i as i64 + base[1], from + base[2], to + base[2]);
+                    }
+                    first += COLUMNS as i64;
+                }
+            } else {
+                top.restart(start);
                 for y in y_low..=y_high {
                     // ceil((d1 - L) / N) with d2 - L = q N + r and d2 - d1 = w N + s is q - w + (r > s).
                     let carry = if top.remainder > thickness_rest { one } else { zero };
-                    let mut from = (top.quotient - thickness + carry).saturate().max(z_low);
-                    let mut to = top.quotient.saturate().min(z_high);
-                    if R::SURFACE {
-                        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "y >= low[1]")]
-                        let [y_from, y_to] = scratch.z_by_y[(y - low[1]) as usize];
-                        from = from.max(y_from);
-                        to = to.min(y_to);
-                    }
-                    if R::TO_TOP {
-                        to = z_high;
-                    }
+                    let [y_from, y_to] = z_by_y.within(to_index(y - low[1]), z);
+                    let from = (top.quotient - thickness + carry).saturate().max(y_from);
+                    let to = if R::TO_TOP { z[1] } else { top.quotient.saturate().min(y_to) };
                     if from <= to {
                         sink.run(x + base[0], y + base[1], from + base[2], to + base[2]);
                     }
                     top.advance();
                 }
             }
-            at_row = at_row - up[0];
         }
-    } else {
-        for x in x_low..=x_high {
-            let [y_low, y_high] = y_by_x.next([low[1], high[1]]);
-            let [z_low, z_high] = z_by_x.next([low[2], high[2]]);
-            for y in y_low..=y_high {
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "y >= low[1]")]
-                let [y_from, y_to] = scratch.z_by_y[(y - low[1]) as usize];
-                let (from, to) = (z_low.max(y_from), z_high.min(y_to));
-                if from <= to {
-                    sink.run(x + base[0], y + base[1], from + base[2], to + base[2]);
-                }
-            }
-        }
+        at_row = at_row - up[0];
     }
+}
+
+/// An index or a count.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "of voxels, and not negative")]
+fn to_index(i: i64) -> usize {
+    i as usize
 }

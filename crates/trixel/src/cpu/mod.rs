@@ -37,6 +37,7 @@ mod rule;
 mod setup;
 mod sink;
 mod slabs;
+mod slanted;
 mod tiny;
 mod triangles;
 

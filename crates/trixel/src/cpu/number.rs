@@ -19,6 +19,9 @@ pub(crate) trait Int:
 
     /// An index of a voxel from a quotient that may be far outside every grid.
     fn saturate(self) -> i64;
+
+    /// As a float, which holds it exactly up to 2^53.
+    fn as_float(self) -> f64;
 }
 
 /// The largest bounding box, in voxels along an axis less one, for which 64-bit arithmetic is exact.
@@ -56,6 +59,12 @@ impl Int for i64 {
     fn saturate(self) -> i64 {
         self
     }
+
+    #[inline(always)]
+    #[expect(clippy::cast_precision_loss, reason = "documented")]
+    fn as_float(self) -> f64 {
+        self as f64
+    }
 }
 
 impl Int for i128 {
@@ -79,6 +88,12 @@ impl Int for i128 {
     fn saturate(self) -> i64 {
         const LIMIT: i128 = 1 << 40;
         self.clamp(-LIMIT, LIMIT) as i64
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_precision_loss, reason = "documented")]
+    fn as_float(self) -> f64 {
+        self as f64
     }
 }
 
