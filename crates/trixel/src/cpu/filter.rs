@@ -10,6 +10,8 @@
 //!   `64 u m`.
 //! - The plane's term, `N . v + N . p` against its reach, is off by less than `256 u m^2`.
 //!
+//! Where the processor fuses a product and a sum, one rounding less is made.
+//!
 //! An edge that a projection shows as a point has only zeros. It passes whatever the voxel, and is given a reach that says
 //! so; the reach of any other is at least a step, `2^-15`, and thus as large as `64 u m` without help.
 
