@@ -200,9 +200,9 @@ fn runs<T: Int, R: Rule>(
         let [y_low, y_high] = y_by_x.next([low[1], high[1]]);
         let z = z_by_x.next([low[2], high[2]]);
         if y_low <= y_high && z[0] <= z[1] {
-            let start = at_row - up[1] * T::from(y_low);
+            top.restart(at_row - up[1] * T::from(y_low));
             if let Some(slanted) = &mut slanted {
-                slanted.start(start, up[2]);
+                slanted.start(&top);
                 let mut first = y_low;
                 while first <= y_high {
                     let columns = to_index(first - low[1])..to_index(y_high - low[1]) + 1;
@@ -214,7 +214,6 @@ fn runs<T: Int, R: Rule>(
                     first += COLUMNS as i64;
                 }
             } else {
-                top.restart(start);
                 for y in y_low..=y_high {
                     // ceil((d1 - L) / N) with d2 - L = q N + r and d2 - d1 = w N + s is q - w + (r > s).
                     let carry = if top.remainder > thickness_rest { one } else { zero };

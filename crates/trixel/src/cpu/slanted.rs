@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use fearless_simd::{Level, Simd, dispatch, f64x8, i64x8, prelude::*};
 
-use super::number::Int;
+use super::number::{FloorLine, Int};
 
 /// Columns of a vector.
 const LANES: usize = 8;
@@ -85,32 +85,30 @@ impl Slanted {
     #[inline(always)]
     pub(super) fn new<T: Int>(up: [T; 3], [d1, d2]: [T; 2], high: [i64; 2]) -> Option<Self> {
         let abs = |value: T| value.max(-value);
-        let (zero, limit) = (T::from(0), T::from(LIMIT));
+        let limit = T::from(LIMIT);
         // Some columns past the end are computed too, and not used.
         let columns = [high[0], high[1] + 2 * LANES as i64].map(T::from);
         let farthest = abs(d1) + abs(d2) + abs(up[0]) * columns[0] + abs(up[1]) * columns[1];
         if up[2] >= limit || farthest.div_floor(up[2]).0 >= limit {
             return None;
         }
-        let divide = |value: T| {
-            let (quotient, remainder) = value.div_floor(up[2]);
-            Division { quotient: quotient.as_float(), remainder: remainder.as_float() }
-        };
         let mut ahead = Division { quotient: [0.0; LANES], remainder: [0.0; LANES] };
-        let mut along = zero;
+        let mut line = FloorLine::new(T::from(0), -up[1], up[2]);
         for lane in 0..LANES {
-            let Division { quotient, remainder } = divide(along);
-            (ahead.quotient[lane], ahead.remainder[lane]) = (quotient, remainder);
-            along = along - up[1];
+            (ahead.quotient[lane], ahead.remainder[lane]) = (line.quotient.as_float(), line.remainder.as_float());
+            line.advance();
         }
-        Some(Self { divisor: up[2].as_float(), top: ahead, ahead, step: divide(along), thickness: divide(d2 - d1) })
+        let division =
+            |(quotient, remainder): (T, T)| Division { quotient: quotient.as_float(), remainder: remainder.as_float() };
+        let step = division((line.quotient, line.remainder));
+        let thickness = division((d2 - d1).div_floor(up[2]));
+        Some(Self { divisor: up[2].as_float(), ahead, step, thickness, top: ahead })
     }
 
-    /// Goes to the column in which the plane's upper bound is `floor(start / N_z)`.
+    /// Goes to the column in which the plane's upper bound is where `line` is.
     #[inline(always)]
-    pub(super) fn start<T: Int>(&mut self, start: T, divisor: T) {
-        let (quotient, remainder) = start.div_floor(divisor);
-        let (quotient, remainder) = (quotient.as_float(), remainder.as_float());
+    pub(super) fn start<T: Int>(&mut self, line: &FloorLine<T>) {
+        let (quotient, remainder) = (line.quotient.as_float(), line.remainder.as_float());
         for lane in 0..LANES {
             let sum = remainder + self.ahead.remainder[lane];
             let carry = if sum >= self.divisor { 1.0 } else { 0.0 };
@@ -121,6 +119,8 @@ impl Slanted {
 
     /// The runs of the next columns, of which the ranges of z are given, within `z` or, if `to_top`, from within it to its
     /// end. Gives the columns that have one.
+    ///
+    /// The instructions are picked here, so that large triangles' other code is not compiled for each set of them.
     pub(super) fn next(
         &mut self,
         level: Level,
@@ -213,7 +213,8 @@ mod tests {
             let mut runs = Runs::default();
             for x in [0, high[0] / 2, high[0]] {
                 let first = random.range(0, high[1]);
-                slanted.start(d2 - up[0] * i128::from(x) - up[1] * i128::from(first), up[2]);
+                let at_first = d2 - up[0] * i128::from(x) - up[1] * i128::from(first);
+                slanted.start(&FloorLine::new(at_first, -up[1], up[2]));
                 for start in (first..=high[1]).step_by(COLUMNS) {
                     let columns = usize::try_from(start).unwrap()..any.len();
                     let to_top = round % 3 == 0;
