@@ -1,5 +1,7 @@
 //! A mode, bound to the instructions that it is computed with: paints triangles into a piece of the grid.
 
+#[cfg(feature = "threads")]
+use fearless_simd::Simd;
 use fearless_simd::{Level, dispatch};
 
 use super::kernel::{self, VoxelBox};
@@ -60,6 +62,15 @@ impl Painter {
         }
     }
 
+    /// Moves the voxels of a copy into the original.
+    #[cfg(feature = "threads")]
+    pub(super) fn move_voxels(&self, from: &mut [u64], to: &mut [u64]) {
+        dispatch!(self.level, simd => simd.vectorize(
+            #[inline(always)]
+            || move_voxels(from, to)
+        ));
+    }
+
     /// Sorts the triangles, or what tiny ones set or toggle, into the slabs of an outbox, until it is full.
     #[cfg(feature = "threads")]
     pub(super) fn sort<'a>(
@@ -110,6 +121,20 @@ impl Painter {
             Mode::Solid => {
                 let mut sink = ToggleRuns(into);
                 dispatch!(self.level, simd => kernel::centres(simd, &Solid, pieces, clip, &mut sink));
+            }
+        }
+    }
+}
+
+/// In blocks, because most of a copy has no voxels, and what has some is quicker moved without asking.
+#[cfg(feature = "threads")]
+#[inline(always)]
+fn move_voxels(from: &mut [u64], to: &mut [u64]) {
+    const BLOCK: usize = 64;
+    for (to, from) in to.chunks_mut(BLOCK).zip(from.chunks_mut(BLOCK)) {
+        if from.iter().fold(0, |all, word| all | word) != 0 {
+            for (to, from) in to.iter_mut().zip(from) {
+                *to |= std::mem::take(from);
             }
         }
     }

@@ -76,7 +76,7 @@ mod parallel {
     use super::{LatticeMesh, Painter, Selected, Slab, Spare, VoxelBox, clip_of, prefix_xor};
     use crate::cpu::gate::Gate;
     use crate::cpu::outbox::{Compartment, Cuts, Outbox};
-    use crate::cpu::triangles::corners;
+    use crate::cpu::triangles::{BLOCK, corners};
     use crate::volume::Volume;
 
     /// The smallest slab has this part of a thread's work.
@@ -84,6 +84,10 @@ mod parallel {
     /// Pieces of the triangles a thread, within limits of triangles.
     const PIECES: u64 = 64;
     const PIECE: RangeInclusive<u64> = 1 << 8..=1 << 11;
+    /// Pieces are at most this part of what is left, so that threads are done at about the same time.
+    const LAST_PIECES: u64 = 16;
+    /// They are whole blocks, so that no vector is half empty.
+    const WHOLE: u64 = BLOCK as u64;
     /// Pieces of the grid a thread, when copies are put together.
     const PIECES_OF_GRID: usize = 8;
     /// Triangles that are looked at to cut the grid.
@@ -139,7 +143,7 @@ mod parallel {
     pub(super) struct Parts {
         /// What is left of each: the first in the lower half, the end in the upper.
         left: Vec<AtomicU64>,
-        /// Triangles in a piece.
+        /// Triangles in a piece, at most.
         size: u64,
     }
 
@@ -160,7 +164,7 @@ mod parallel {
         }
 
         /// A piece for the `i`th thread.
-        fn next(&self, i: usize) -> Option<Range<usize>> {
+        pub(super) fn next(&self, i: usize) -> Option<Range<usize>> {
             let parts = self.count();
             (0..parts).find_map(|other| self.take((i + other) % parts, other != 0))
         }
@@ -173,18 +177,22 @@ mod parallel {
         #[expect(clippy::cast_possible_truncation, reason = "the halves")]
         fn take(&self, part: usize, from_end: bool) -> Option<Range<usize>> {
             let split = |left: u64| u64::from(left as u32)..left >> 32;
+            let size_of = |left: u64| {
+                let size = (left / LAST_PIECES).clamp(WHOLE, self.size);
+                (size - size % WHOLE).min(left)
+            };
             let left = self.left[part].fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
                 let Range { start, end } = split(left);
-                let size = self.size.min(end.saturating_sub(start));
+                let size = size_of(end.saturating_sub(start));
                 (size > 0).then(|| if from_end { packed(start, end - size) } else { packed(start + size, end) })
             });
             let Range { start, end } = split(left.ok()?);
-            let size = self.size.min(end - start);
+            let size = size_of(end - start);
             let taken = if from_end { end - size..end } else { start..start + size };
             Some(taken.start as usize..taken.end as usize)
         }
 
-        fn all_taken(&self) -> bool {
+        pub(super) fn all_taken(&self) -> bool {
             self.left.iter().all(|left| {
                 let left = left.load(Ordering::Relaxed);
                 left >> 32 == left & u64::from(u32::MAX)
@@ -252,7 +260,7 @@ mod parallel {
         let join = || {
             while let Some((i, words)) = next() {
                 for copy in copies.iter().filter_map(OnceLock::get) {
-                    move_voxels(&mut lock(&copy[i]), words);
+                    painter.move_voxels(&mut lock(&copy[i]), words);
                 }
             }
         };
@@ -291,20 +299,6 @@ mod parallel {
             join();
         });
         lock(&spare.kept).copies = kept;
-    }
-
-    /// Moves the voxels of a copy, most of whose words have none.
-    fn move_voxels(from: &mut [u64], to: &mut [u64]) {
-        /// A cache line.
-        const LINE: usize = 8;
-        for (to, from) in to.chunks_mut(LINE).zip(from.chunks_mut(LINE)) {
-            if from.iter().fold(0, |all, word| all | word) != 0 {
-                for (to, from) in to.iter_mut().zip(&mut *from) {
-                    *to |= *from;
-                    *from = 0;
-                }
-            }
-        }
     }
 
     /// Every thread paints slabs.
@@ -430,6 +424,21 @@ mod tests {
                 backend.voxelize(&lattice, &job, &mut volume).unwrap();
                 assert!(volume == expected, "{name}, {mode}, {:?}, {} threads", grid.dims(), backend.threads());
             }
+        }
+    }
+
+    /// Whichever thread comes when.
+    #[test]
+    fn every_triangle_is_in_one_piece() {
+        for (triangles, threads) in [(0, 2), (1, 3), (63, 1), (1000, 2), (100_000, 7), (1_000_003, 2)] {
+            let parts = parallel::Parts::new(triangles, threads);
+            let mut times = vec![0; triangles as usize];
+            // Some come more often than others.
+            let turns = (0..threads).chain(threads / 2..threads).cycle();
+            for piece in turns.map_while(|thread| parts.next(thread)) {
+                times[piece].iter_mut().for_each(|times| *times += 1);
+            }
+            assert!(parts.all_taken() && times.iter().all(|&times| times == 1), "{triangles}, {threads} threads");
         }
     }
 
