@@ -1,7 +1,7 @@
 //! The tests of triangles of a few voxels in f32, sixteen triangles at a time, and which of them rounding may have decided.
 //!
-//! Half a voxel is the unit, and the middle of a cube of `SIDE` voxels the origin, so that voxels' centres are whole numbers
-//! `p` with `|p| < SIDE`, and corners are exact, with `|v| <= SIDE <= 4`. Let `m` be the longest side of a triangle's box
+//! Half a voxel is the unit, and the middle of a cuboid of voxels the origin, so that voxels' centres are whole numbers `p`
+//! with `|p| < D`, for `D` voxels along an axis, and corners are exact, with `|v| <= D <= 4`. Let `m` be the longest side of a triangle's box
 //! and `u = 2^-24` the most by which a sum or product of floats is off, relative to it.
 //!
 //! - Edges `e` are exact, with `|e| <= m`. A component of the normal, `p - q` of two products, is off by at most
@@ -19,10 +19,10 @@ use fearless_simd::{Simd, SimdFloat, f32x16, i32x16, prelude::*};
 
 use super::rule::SurfaceRule;
 
-/// The longest side of a cube.
+/// The longest side of a cuboid.
 const MOST: usize = 4;
 
-/// Voxels of a cube of `SIDE` in two halves: voxel `(x, y, z)` is bit `(SIDE x + y) SIDE + z`, from 32 on in the second.
+/// Voxels of a cuboid of `A` by `B` by `C` in two halves: voxel `(x, y, z)` is bit `(B x + y) C + z`, from 32 on in the second.
 pub(super) type Bits = [i32; 2];
 
 /// [`Bits`] for each lane.
@@ -39,45 +39,35 @@ const PLANE_DOUBT: f32 = 256.0 * UNIT;
 const NORMAL_DOUBT: f32 = 8.0 * UNIT;
 const UNIT: f32 = 1.0 / (1 << 24) as f32;
 
+/// Constants for cuboids of `A` by `B` by `C` voxels.
+pub(super) struct Cuboid<const A: usize, const B: usize, const C: usize>;
+
 /// Constants for cubes of `SIDE`.
-pub(super) struct Cube<const SIDE: usize>;
+pub(super) type Cube<const SIDE: usize> = Cuboid<SIDE, SIDE, SIDE>;
 
-impl<const SIDE: usize> Cube<SIDE> {
+impl<const A: usize, const B: usize, const C: usize> Cuboid<A, B, C> {
     /// The cells of the projections to yz, zx and xy.
-    pub(super) const CELLS: [Cells; 3] = [cells::<SIDE>(1, 2), cells::<SIDE>(2, 0), cells::<SIDE>(0, 1)];
+    pub(super) const CELLS: [Cells; 3] = [cells::<A, B, C>(1, 2), cells::<A, B, C>(2, 0), cells::<A, B, C>(0, 1)];
     /// The layers across each axis.
-    pub(super) const LAYERS: [[Bits; MOST]; 3] = [across::<SIDE>(0), across::<SIDE>(1), across::<SIDE>(2)];
-    /// The cells of a layer.
-    const LAYER: Cells = layer::<SIDE>();
+    pub(super) const LAYERS: [[Bits; MOST]; 3] = [across::<A, B, C>(0), across::<A, B, C>(1), across::<A, B, C>(2)];
     /// The words of [`Bits`] in use.
-    pub(super) const WORDS: usize = (SIDE * SIDE * SIDE).div_ceil(32);
-}
-
-/// The cells of a layer of voxels: `(a, b)` is bit `SIDE a + b`.
-const fn layer<const SIDE: usize>() -> Cells {
-    let mut cells = [[[0; 2]; MOST]; MOST];
-    let mut i = 0;
-    while i < SIDE * SIDE {
-        cells[i / SIDE][i % SIDE][0] = 1 << i;
-        i += 1;
-    }
-    cells
+    pub(super) const WORDS: usize = (A * B * C).div_ceil(32);
 }
 
 /// The bit of a voxel.
-const fn bit<const SIDE: usize>(x: usize, y: usize, z: usize) -> Bits {
-    let bit = 1u64 << ((SIDE * x + y) * SIDE + z);
+const fn bit<const B: usize, const C: usize>(x: usize, y: usize, z: usize) -> Bits {
+    let bit = 1u64 << ((B * x + y) * C + z);
     #[expect(clippy::cast_possible_truncation, reason = "the halves")]
     [bit as i32, (bit >> 32) as i32]
 }
 
 /// What the projection to the axes a and b shows in each of its cells.
-const fn cells<const SIDE: usize>(a: usize, b: usize) -> Cells {
+const fn cells<const A: usize, const B: usize, const C: usize>(a: usize, b: usize) -> Cells {
     let mut cells = [[[0; 2]; MOST]; MOST];
     let mut voxel = 0;
-    while voxel < SIDE * SIDE * SIDE {
-        let index = [voxel / (SIDE * SIDE), voxel / SIDE % SIDE, voxel % SIDE];
-        let bit = bit::<SIDE>(index[0], index[1], index[2]);
+    while voxel < A * B * C {
+        let index = [voxel / (B * C), voxel / C % B, voxel % C];
+        let bit = bit::<B, C>(index[0], index[1], index[2]);
         let cell = &mut cells[index[a]][index[b]];
         *cell = [cell[0] | bit[0], cell[1] | bit[1]];
         voxel += 1;
@@ -86,8 +76,8 @@ const fn cells<const SIDE: usize>(a: usize, b: usize) -> Cells {
 }
 
 /// The voxels of each layer across an axis.
-const fn across<const SIDE: usize>(axis: usize) -> [Bits; MOST] {
-    let cells = cells::<SIDE>(axis, (axis + 1) % 3);
+const fn across<const A: usize, const B: usize, const C: usize>(axis: usize) -> [Bits; MOST] {
+    let cells = cells::<A, B, C>(axis, (axis + 1) % 3);
     let mut layers = [[0; 2]; MOST];
     let mut i = 0;
     while i < MOST * MOST {
@@ -107,9 +97,9 @@ pub(super) struct Filtered<V: Simd> {
     pub(super) doubtful: u64,
 }
 
-/// The voxels of cubes of `SIDE` that triangles meet, for their corners and the longest sides of their boxes.
+/// The voxels of cuboids of `A` by `B` by `C` that triangles meet, for their corners and the longest sides of their boxes.
 #[inline(always)]
-pub(super) fn cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
+pub(super) fn cuboids<V: Simd, R: SurfaceRule, const A: usize, const B: usize, const C: usize>(
     simd: V,
     rule: &R,
     v: &[[f32x16<V>; 3]; 3],
@@ -118,13 +108,15 @@ pub(super) fn cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
     let mut tests = Tests::new(simd, longest);
     let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
     let n = [tests.cross(&e, 1, 2), tests.cross(&e, 2, 0), tests.cross(&e, 0, 1)];
-    let mut voxels = tests.plane::<R, SIDE>(simd, rule, n, v[0]);
-    for (i, n) in n.into_iter().enumerate() {
-        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
-        let pass = tests.edges::<R, SIDE>(simd, rule, pick(v, a, b), pick(&e, a, b), n, &Cube::<SIDE>::CELLS[i]);
-        for word in 0..Cube::<SIDE>::WORDS {
-            voxels[word] &= pass[word];
-        }
+    let (words, cells) = (Cuboid::<A, B, C>::WORDS, &Cuboid::<A, B, C>::CELLS);
+    let mut voxels = tests.plane::<R, A, B, C>(simd, rule, n, v[0]);
+    let passing = [
+        tests.edges::<R, B, C>(simd, rule, pick(v, 1, 2), pick(&e, 1, 2), n[0], &cells[0], words),
+        tests.edges::<R, C, A>(simd, rule, pick(v, 2, 0), pick(&e, 2, 0), n[1], &cells[1], words),
+        tests.edges::<R, A, B>(simd, rule, pick(v, 0, 1), pick(&e, 0, 1), n[2], &cells[2], words),
+    ];
+    for word in 0..words {
+        voxels[word] &= passing[0][word] & passing[1][word] & passing[2][word];
     }
     Filtered { voxels, doubtful: tests.doubtful(simd) }
 }
@@ -140,7 +132,8 @@ pub(super) fn layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
     let mut tests = Tests::new(simd, longest);
     let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
     let area = tests.cross(&e, 0, 1);
-    let voxels = tests.edges::<R, SIDE>(simd, rule, *v, e, area, &Cube::<SIDE>::LAYER);
+    let cells = &Cuboid::<SIDE, SIDE, 1>::CELLS[2];
+    let voxels = tests.edges::<R, SIDE, SIDE>(simd, rule, *v, e, area, cells, 1);
     Filtered { voxels, doubtful: tests.doubtful(simd) }
 }
 
@@ -185,7 +178,7 @@ impl<V: Simd> Tests<V> {
 
     /// The voxels within reach of the plane.
     #[inline(always)]
-    fn plane<R: SurfaceRule, const SIDE: usize>(
+    fn plane<R: SurfaceRule, const A: usize, const B: usize, const C: usize>(
         &mut self,
         simd: V,
         rule: &R,
@@ -196,17 +189,17 @@ impl<V: Simd> Tests<V> {
         let mut voxels = [i32x16::splat(simd, 0); 2];
         let reach = rule.centre_plane_reach([n[0].abs(), n[1].abs(), n[2].abs()]);
         let at_middle = n[2].mul_add(v[2], n[1].mul_add(v[1], n[0] * v[0]));
-        for x in 0..SIDE {
-            let at_x = n[0] * centre::<SIDE>(x) - at_middle;
-            for y in 0..SIDE {
-                let at_y = n[1] * centre::<SIDE>(y) + at_x;
-                for z in 0..SIDE {
-                    let at = n[2] * centre::<SIDE>(z) + at_y;
+        for x in 0..A {
+            let at_x = n[0] * centre::<A>(x) - at_middle;
+            for y in 0..B {
+                let at_y = n[1] * centre::<B>(y) + at_x;
+                for z in 0..C {
+                    let at = n[2] * centre::<C>(z) + at_y;
                     let within = reach - at.abs();
                     self.plane = self.plane.min(within.abs());
-                    let bits = bit::<SIDE>(x, y, z);
+                    let bits = bit::<B, C>(x, y, z);
                     let passing = within.simd_ge(zero);
-                    for word in 0..Cube::<SIDE>::WORDS {
+                    for word in 0..Cuboid::<A, B, C>::WORDS {
                         voxels[word] = passing.select(voxels[word] | bits[word], voxels[word]);
                     }
                 }
@@ -217,7 +210,7 @@ impl<V: Simd> Tests<V> {
 
     /// The voxels that cells of a projection show in which all three edge functions hold.
     #[inline(always)]
-    fn edges<R: SurfaceRule, const SIDE: usize>(
+    fn edges<R: SurfaceRule, const A: usize, const B: usize>(
         &mut self,
         simd: V,
         rule: &R,
@@ -225,30 +218,31 @@ impl<V: Simd> Tests<V> {
         e: [[f32x16<V>; 2]; 3],
         area: f32x16<V>,
         cells: &Cells,
+        words: usize,
     ) -> Voxels<V> {
         let zero = f32x16::splat(simd, 0.0);
         // Inward normals point left of the edges when the projection turns left.
         let side = f32x16::splat(simd, 1.0).copysign(area);
-        let mut least = [[zero; SIDE]; SIDE];
+        let mut least = [[zero; B]; A];
         for k in 0..3 {
             // Lengths without their sign are the same in another projection, and found once.
             let reach = rule.centre_reach(e[k][0].abs(), e[k][1].abs()).max(self.edge_doubt);
             let (ea, eb) = (e[k][0] * side, e[k][1] * side);
             let at_middle = (-ea).mul_add(v[k][1], eb.mul_add(v[k][0], reach));
-            for a in 0..SIDE {
-                let at_a = at_middle - eb * centre::<SIDE>(a);
-                for b in 0..SIDE {
-                    let at = ea * centre::<SIDE>(b) + at_a;
+            for a in 0..A {
+                let at_a = at_middle - eb * centre::<A>(a);
+                for b in 0..B {
+                    let at = ea * centre::<B>(b) + at_a;
                     least[a][b] = if k == 0 { at } else { least[a][b].min(at) };
                 }
             }
         }
         let mut voxels = [i32x16::splat(simd, 0); 2];
-        for a in 0..SIDE {
-            for b in 0..SIDE {
+        for a in 0..A {
+            for b in 0..B {
                 self.edge = self.edge.min(least[a][b].abs());
                 let passing = least[a][b].simd_ge(zero);
-                for word in 0..Cube::<SIDE>::WORDS {
+                for word in 0..words {
                     voxels[word] = passing.select(voxels[word] | cells[a][b][word], voxels[word]);
                 }
             }

@@ -147,7 +147,7 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
                 let three = at_most(3) & tiny;
                 let four = tiny & !three;
                 let shortest = extent[0].min(extent[1]).min(extent[2]);
-                let flat = if R::TOUCH_IS_ENOUGH { shortest.simd_le(0).to_bitmask() } else { 0 };
+                let flat = shortest.simd_le(0).to_bitmask();
                 if three & flat != 0 && waiting.flat_threes.push(simd, &corners, three & flat) {
                     simd.vectorize(
                         #[inline(always)]
@@ -185,11 +185,11 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
     );
     if R::TOUCH_IS_ENOUGH {
         tiny::flush_octants(simd, &mut waiting.twos, true, &near, sink);
-        tiny::flush_flats::<_, _, 3>(simd, rule, &mut waiting.flat_threes, true, &near, sink);
-        tiny::flush_flats::<_, _, 4>(simd, rule, &mut waiting.flat_fours, true, &near, sink);
     } else {
         tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, true, &near, sink);
     }
+    tiny::flush_flats::<_, _, 3>(simd, rule, &mut waiting.flat_threes, true, &near, sink);
+    tiny::flush_flats::<_, _, 4>(simd, rule, &mut waiting.flat_fours, true, &near, sink);
     tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, true, &near, sink);
     tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, true, &near, sink);
 }

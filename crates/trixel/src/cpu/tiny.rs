@@ -128,10 +128,10 @@ pub(super) fn send_cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
 ) {
     let boxes = Boxes::new(simd, corners);
     let places = sink.places(&boxes.low, clip.base);
-    let middle = half_voxels(&boxes.low, SIDE);
+    let middle = middles(&boxes.low, SIDE);
     let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
     let Filtered { mut voxels, doubtful } =
-        filter::cubes::<_, _, SIDE>(simd, rule, &corners.floats(middle, PER_HALF), longest);
+        filter::cuboids::<_, _, SIDE, SIDE, SIDE>(simd, rule, &corners.floats(middle, PER_HALF), longest);
     if doubtful & lanes != 0 {
         voxels = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
     }
@@ -151,7 +151,7 @@ pub(super) fn send_octants<V: Simd>(
     const SIDE: usize = 2;
     let boxes = Boxes::new(simd, corners);
     let places = sink.places(&boxes.low, clip.base);
-    let middle = half_voxels(&boxes.low, SIDE);
+    let middle = middles(&boxes.low, SIDE);
     let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
     let voxels = octants::voxels(simd, corners, middle, longest, PER_HALF, boxes.layers(clip), lanes);
     sink.cubes::<_, SIDE>(&places, &[voxels, i32x16::splat(simd, 0)], lanes);
@@ -178,8 +178,8 @@ pub(super) fn flush_octants<V: Simd>(
     waiting.keep(simd, first);
 }
 
-/// [`flush`] for boxes of one voxel along some axis: strictly inside their layer, triangles meet a voxel where their
-/// projections meet.
+/// [`flush`] for boxes of one voxel along some axis. Where touching is enough, triangles strictly inside their layer meet a
+/// voxel where their projections meet.
 #[inline(always)]
 pub(super) fn flush_flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
@@ -215,38 +215,51 @@ fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     let corners = waiting.vectors(simd, first);
     let boxes = Boxes::new(simd, &corners);
     let places = sink.places(&boxes.low, clip.base);
-    // The axes (a, b) of the layer, ascending; of a row of voxels, one of its two layers.
-    let along_x = boxes.extent[0].simd_le(0);
-    let along_z = boxes.extent[2].simd_le(0) & !along_x;
-    let middle = half_voxels(&boxes.low, SIDE);
-    let mut flattened = corners;
-    for p in &mut flattened.0 {
-        for i in 0..3 {
-            p[i] -= middle[i];
-        }
-        *p = [along_x.select(p[1], p[0]), along_z.select(p[1], p[2]), p[0]];
-    }
-    let v = flattened.floats([i32x16::splat(simd, 0); 3], PER_HALF);
-    let layer = [[v[0][0], v[0][1]], [v[1][0], v[1][1]], [v[2][0], v[2][1]]];
-    let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
-    let Filtered { mut voxels, doubtful } = filter::layers::<_, _, SIDE>(simd, rule, &layer, longest);
+    let Filtered { mut voxels, doubtful } = in_layers::<_, _, SIDE>(simd, rule, &corners, &boxes);
     if doubtful & used(count) != 0 {
         voxels = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
-    } else if SIDE == 3 {
-        voxels[0] = spread_three(voxels[0], along_x, along_z);
-    } else {
-        voxels = spread_four(simd, voxels[0], along_x, along_z);
     }
     boxes.keep::<SIDE>(simd, clip, &mut voxels);
     sink.cubes::<_, SIDE>(&places, &voxels, used(count));
 }
 
+/// The voxels of cubes of `SIDE` that triangles meet whose boxes are one layer, or of a row of voxels one of its two.
+#[inline(always)]
+fn in_layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
+    simd: V,
+    rule: &R,
+    corners: &Vectors<V>,
+    boxes: &Boxes<V>,
+) -> Filtered<V> {
+    let across_x = boxes.extent[0].simd_le(0);
+    let layer = Layer { across_x, across_z: boxes.extent[2].simd_le(0) & !across_x };
+    let [a, b, c] = layer.turned(boxes.low);
+    let [v0, v1, v2] = corners.0;
+    let turned = Vectors([layer.turned(v0), layer.turned(v1), layer.turned(v2)]);
+    let v = turned.floats([middle(a, SIDE), middle(b, SIDE), middle(c, 1)], PER_HALF);
+    let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
+    let Filtered { voxels: [cells, none], doubtful } = if R::TOUCH_IS_ENOUGH {
+        let v = [[v[0][0], v[0][1]], [v[1][0], v[1][1]], [v[2][0], v[2][1]]];
+        filter::layers::<_, _, SIDE>(simd, rule, &v, longest)
+    } else {
+        filter::cuboids::<_, _, SIDE, SIDE, 1>(simd, rule, &v, longest)
+    };
+    let voxels = if SIDE == 3 { [layer.spread_three(cells), none] } else { layer.spread_four(cells) };
+    Filtered { voxels, doubtful }
+}
+
 /// The lattice points at the middle of cubes of `side` voxels.
 #[inline(always)]
-fn half_voxels<V: Simd>(low: &[i32x16<V>; 3], side: usize) -> [i32x16<V>; 3] {
+fn middles<V: Simd>(low: &[i32x16<V>; 3], side: usize) -> [i32x16<V>; 3] {
+    [middle(low[0], side), middle(low[1], side), middle(low[2], side)]
+}
+
+/// The middle of `side` voxels along an axis.
+#[inline(always)]
+fn middle<V: Simd>(low: i32x16<V>, side: usize) -> i32x16<V> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "at most 4")]
     let half = side as i32 * (STEPS_PER_VOXEL / 2) as i32;
-    [(low[0] << STEP_BITS) + half, (low[1] << STEP_BITS) + half, (low[2] << STEP_BITS) + half]
+    (low << STEP_BITS) + half
 }
 
 /// The first `count` lanes.
@@ -255,40 +268,45 @@ fn used(count: usize) -> Lanes {
     (1 << count) - 1
 }
 
-/// Bit `3 a + b` of a layer of 3 x 3 voxels to the bit of its voxel in a cube: a layer across x if `along_x`, across z if
-/// `along_z`, or else across y.
-#[inline(always)]
-fn spread_three<V: Simd>(cells: i32x16<V>, along_x: mask32x16<V>, along_z: mask32x16<V>) -> i32x16<V> {
-    // Each row's three bits to every ninth, each bit to every third.
-    let rows = cells & 0o7 | (cells & 0o70) << 6 | (cells & 0o700) << 12;
-    let bits = rows & 0o001_001_001 | (rows & 0o002_002_002) << 2 | (rows & 0o004_004_004) << 4;
-    along_x.select(cells, along_z.select(bits, rows))
+/// Where layers of voxels are across x or z.
+struct Layer<V: Simd> {
+    across_x: mask32x16<V>,
+    across_z: mask32x16<V>,
 }
 
-/// [`spread_three`] for a layer of 4 x 4.
-#[inline(always)]
-fn spread_four<V: Simd>(simd: V, cells: i32x16<V>, along_x: mask32x16<V>, along_z: mask32x16<V>) -> Voxels<V> {
-    let (along_x, along_z) = (along_x.to_bitmask(), along_z.to_bitmask());
-    let mut words = [[0; LANES]; 2];
-    for lane in 0..LANES {
-        // Each row's four bits to every 16th, each bit to every fourth.
-        let row = u64::from(cells[lane].cast_unsigned());
-        let rows = (row | row << 24) & 0x0000_00ff_0000_00ff;
-        let rows = (rows | rows << 12) & 0x000f_000f_000f_000f;
-        let bits = (rows | rows << 6) & 0x0303_0303_0303_0303;
-        let bits = (bits | bits << 3) & 0x1111_1111_1111_1111;
-        let cube = match (along_x >> lane & 1, along_z >> lane & 1) {
-            (1, _) => row,
-            (_, 1) => bits,
-            _ => rows,
-        };
-        #[expect(clippy::cast_possible_truncation, reason = "the halves")]
-        {
-            words[0][lane] = cube as i32;
-            words[1][lane] = (cube >> 32) as i32;
-        }
+impl<V: Simd> Layer<V> {
+    /// The axes of the layer, ascending, and the one across it.
+    #[inline(always)]
+    fn turned(&self, p: [i32x16<V>; 3]) -> [i32x16<V>; 3] {
+        let Self { across_x, across_z } = *self;
+        [across_x.select(p[1], p[0]), across_z.select(p[1], p[2]), across_x.select(p[0], across_z.select(p[2], p[1]))]
     }
-    [i32x16::from_slice(simd, &words[0]), i32x16::from_slice(simd, &words[1])]
+
+    /// Bit `3 a + b` of a layer of 3 x 3 voxels to the bit of its voxel in a cube.
+    #[inline(always)]
+    fn spread_three(&self, cells: i32x16<V>) -> i32x16<V> {
+        // Each row's three bits to every ninth, each bit to every third.
+        let rows = cells & 0o7 | (cells & 0o70) << 6 | (cells & 0o700) << 12;
+        let bits = rows & 0o001_001_001 | (rows & 0o002_002_002) << 2 | (rows & 0o004_004_004) << 4;
+        self.across_x.select(cells, self.across_z.select(bits, rows))
+    }
+
+    /// [`Self::spread_three`] for a layer of 4 x 4.
+    #[inline(always)]
+    fn spread_four(&self, cells: i32x16<V>) -> Voxels<V> {
+        let (first, second) = (self.spread_two_rows(cells & 0xff), self.spread_two_rows(cells >> 8));
+        [self.across_x.select(cells, first), self.across_x.select(cells & 0, second)]
+    }
+
+    /// Two rows of a layer of 4 x 4 that is not across x to half of a cube.
+    #[inline(always)]
+    fn spread_two_rows(&self, cells: i32x16<V>) -> i32x16<V> {
+        // Each row's four bits to every 16th, each bit to every fourth.
+        let rows = cells & 0x0f | (cells & 0xf0) << 12;
+        let bits = (rows | rows << 6) & 0x0303_0303;
+        let bits = (bits | bits << 3) & 0x1111_1111;
+        self.across_z.select(bits, rows)
+    }
 }
 
 /// The voxels of cubes of `SIDE`, without rounding.
@@ -452,8 +470,12 @@ mod tests {
             let corners = vectors(simd, &rows);
             let longest = Boxes::new(simd, &corners).longest.to_float::<f32x16<V>>() * PER_HALF;
             let low = [i32x16::splat(simd, 0); 3];
-            let filtered =
-                filter::cubes::<_, _, SIDE>(simd, rule, &corners.floats(half_voxels(&low, SIDE), PER_HALF), longest);
+            let filtered = filter::cuboids::<_, _, SIDE, SIDE, SIDE>(
+                simd,
+                rule,
+                &corners.floats(middles(&low, SIDE), PER_HALF),
+                longest,
+            );
             let voxels = by_lane(&filtered.voxels);
             for (half, corners) in corners.halves(simd, low, 1.0).iter().enumerate() {
                 let mut exact_bits = [0; HALF];
@@ -465,6 +487,37 @@ mod tests {
                         decided += 1;
                     }
                 }
+            }
+        }
+        f64::from(decided) / f64::from(ROUNDS * u32::try_from(LANES).unwrap())
+    }
+
+    /// The share of triangles in one layer that the filter decides, all of them as the exact tests do.
+    fn decided_in_layers<V: Simd, R: SurfaceRule, const SIDE: usize>(simd: V, rule: &R) -> f64 {
+        let mut random = Random::new(SIDE as u64);
+        let mut decided = 0;
+        for round in 0..ROUNDS {
+            let mut rows = in_cube(&mut random, round, i64::try_from(SIDE).unwrap());
+            for lane in 0..LANES {
+                let axis = usize::try_from(random.range(0, 2)).unwrap();
+                for corner in &mut rows {
+                    let step = &mut corner[axis][lane];
+                    *step = (*step).min(i32::try_from(STEPS_PER_VOXEL).unwrap() - 1);
+                }
+            }
+            let corners = vectors(simd, &rows);
+            let boxes = Boxes::new(simd, &corners);
+            let mut exact = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
+            let Filtered { mut voxels, doubtful } = in_layers::<_, _, SIDE>(simd, rule, &corners, &boxes);
+            let all = i32x16::splat(simd, i32::try_from(SIDE).unwrap());
+            let clip = NearClip { base: [0; 3], low: [all - all; 3], high: [all; 3] };
+            boxes.keep::<SIDE>(simd, &clip, &mut exact);
+            boxes.keep::<SIDE>(simd, &clip, &mut voxels);
+            let (exact, voxels) = (by_lane(&exact), by_lane(&voxels));
+            for lane in (0..LANES).filter(|lane| doubtful >> lane & 1 == 0) {
+                let corners = rows.map(|corner| corner.map(|row| row[lane]));
+                assert_eq!(voxels[lane], exact[lane], "side {SIDE}, round {round}, {corners:?}");
+                decided += 1;
             }
         }
         f64::from(decided) / f64::from(ROUNDS * u32::try_from(LANES).unwrap())
@@ -510,7 +563,7 @@ mod tests {
             let mut expected = exact_cubes::<_, _, 2>(simd, &Conservative, &corners.stored());
             boxes.keep::<2>(simd, &clip, &mut expected);
 
-            let (middle, layers) = (half_voxels(&boxes.low, 2), boxes.layers(&clip));
+            let (middle, layers) = (middles(&boxes.low, 2), boxes.layers(&clip));
             let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
             let exact = octants::exact(simd, &corners, middle, layers);
             let meets = clip.meets(&boxes.low, &[0, 1, 2].map(|i| boxes.low[i] + boxes.extent[i]));
@@ -537,6 +590,10 @@ mod tests {
             decided::<_, _, 2>(simd, &Thin),
             decided::<_, _, 3>(simd, &Thin),
             decided::<_, _, 4>(simd, &Thin),
+            decided_in_layers::<_, _, 3>(simd, &Conservative),
+            decided_in_layers::<_, _, 4>(simd, &Conservative),
+            decided_in_layers::<_, _, 3>(simd, &Thin),
+            decided_in_layers::<_, _, 4>(simd, &Thin),
         ]);
         // Of five placements, one has no ties and the others little else.
         assert!(shares.iter().all(|share| (0.15..0.9).contains(share)), "{shares:?}");
