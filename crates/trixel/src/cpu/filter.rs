@@ -111,9 +111,9 @@ pub(super) fn cuboids<V: Simd, R: SurfaceRule, const A: usize, const B: usize, c
     let (words, cells) = (Cuboid::<A, B, C>::WORDS, &Cuboid::<A, B, C>::CELLS);
     let mut voxels = tests.plane::<R, A, B, C>(simd, rule, n, v[0]);
     let passing = [
-        tests.edges::<R, B, C>(simd, rule, pick(v, 1, 2), pick(&e, 1, 2), n[0], &cells[0], words),
-        tests.edges::<R, C, A>(simd, rule, pick(v, 2, 0), pick(&e, 2, 0), n[1], &cells[1], words),
-        tests.edges::<R, A, B>(simd, rule, pick(v, 0, 1), pick(&e, 0, 1), n[2], &cells[2], words),
+        tests.edges::<R, B, C>(simd, rule, &Projection::new(v, &e, 1, 2, n[0]), &cells[0], words),
+        tests.edges::<R, C, A>(simd, rule, &Projection::new(v, &e, 2, 0, n[1]), &cells[1], words),
+        tests.edges::<R, A, B>(simd, rule, &Projection::new(v, &e, 0, 1, n[2]), &cells[2], words),
     ];
     for word in 0..words {
         voxels[word] &= passing[0][word] & passing[1][word] & passing[2][word];
@@ -133,8 +133,30 @@ pub(super) fn layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
     let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
     let area = tests.cross(&e, 0, 1);
     let cells = &Cuboid::<SIDE, SIDE, 1>::CELLS[2];
-    let voxels = tests.edges::<R, SIDE, SIDE>(simd, rule, *v, e, area, cells, 1);
+    let voxels = tests.edges::<R, SIDE, SIDE>(simd, rule, &Projection { v: *v, e, area }, cells, 1);
     Filtered { voxels, doubtful: tests.doubtful(simd) }
+}
+
+/// Triangles as two axes show them.
+struct Projection<V: Simd> {
+    /// Corners.
+    v: [[f32x16<V>; 2]; 3],
+    /// Edges; edge k starts at corner k.
+    e: [[f32x16<V>; 2]; 3],
+    /// Twice the area, above 0 where it turns left.
+    area: f32x16<V>,
+}
+
+impl<V: Simd> Projection<V> {
+    /// To the axes a and b.
+    #[inline(always)]
+    fn new(v: &[[f32x16<V>; 3]; 3], e: &[[f32x16<V>; 3]; 3], a: usize, b: usize, area: f32x16<V>) -> Self {
+        Self {
+            v: [[v[0][a], v[0][b]], [v[1][a], v[1][b]], [v[2][a], v[2][b]]],
+            e: [[e[0][a], e[0][b]], [e[1][a], e[1][b]], [e[2][a], e[2][b]]],
+            area,
+        }
+    }
 }
 
 /// How near to rounding the tests have come.
@@ -214,9 +236,7 @@ impl<V: Simd> Tests<V> {
         &mut self,
         simd: V,
         rule: &R,
-        v: [[f32x16<V>; 2]; 3],
-        e: [[f32x16<V>; 2]; 3],
-        area: f32x16<V>,
+        &Projection { v, e, area }: &Projection<V>,
         cells: &Cells,
         words: usize,
     ) -> Voxels<V> {
@@ -266,10 +286,4 @@ pub(super) fn between<V: Simd, F: SimdFloat<V>, const AXES: usize>(a: [F; AXES],
         edge[i] = b[i] - a[i];
     }
     edge
-}
-
-/// The components a and b of three vectors.
-#[inline(always)]
-fn pick<V: Simd>(of: &[[f32x16<V>; 3]; 3], a: usize, b: usize) -> [[f32x16<V>; 2]; 3] {
-    [[of[0][a], of[0][b]], [of[1][a], of[1][b]], [of[2][a], of[2][b]]]
 }

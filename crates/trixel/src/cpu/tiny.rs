@@ -244,7 +244,7 @@ fn in_layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
     } else {
         filter::cuboids::<_, _, SIDE, SIDE, 1>(simd, rule, &v, longest)
     };
-    let voxels = if SIDE == 3 { [layer.spread_three(cells), none] } else { layer.spread_four(cells) };
+    let voxels = if SIDE == 3 { [layer.spread_three(cells), none] } else { layer.spread_four(simd, cells) };
     Filtered { voxels, doubtful }
 }
 
@@ -293,9 +293,9 @@ impl<V: Simd> Layer<V> {
 
     /// [`Self::spread_three`] for a layer of 4 x 4.
     #[inline(always)]
-    fn spread_four(&self, cells: i32x16<V>) -> Voxels<V> {
+    fn spread_four(&self, simd: V, cells: i32x16<V>) -> Voxels<V> {
         let (first, second) = (self.spread_two_rows(cells & 0xff), self.spread_two_rows(cells >> 8));
-        [self.across_x.select(cells, first), self.across_x.select(cells & 0, second)]
+        [self.across_x.select(cells, first), self.across_x.select(i32x16::splat(simd, 0), second)]
     }
 
     /// Two rows of a layer of 4 x 4 that is not across x to half of a cube.
@@ -510,7 +510,7 @@ mod tests {
             let mut exact = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
             let Filtered { mut voxels, doubtful } = in_layers::<_, _, SIDE>(simd, rule, &corners, &boxes);
             let all = i32x16::splat(simd, i32::try_from(SIDE).unwrap());
-            let clip = NearClip { base: [0; 3], low: [all - all; 3], high: [all; 3] };
+            let clip = NearClip { base: [0; 3], low: [i32x16::splat(simd, 0); 3], high: [all; 3] };
             boxes.keep::<SIDE>(simd, &clip, &mut exact);
             boxes.keep::<SIDE>(simd, &clip, &mut voxels);
             let (exact, voxels) = (by_lane(&exact), by_lane(&voxels));
