@@ -12,14 +12,17 @@ const S: i128 = STEPS_PER_VOXEL as i128;
 
 type Vector = [i128; 3];
 
+#[inline]
 fn sub(a: Vector, b: Vector) -> Vector {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+#[inline]
 fn cross(a: Vector, b: Vector) -> Vector {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+#[inline]
 fn dot(a: Vector, b: Vector) -> i128 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
@@ -100,6 +103,7 @@ pub fn conservative(triangle: [Vector; 3], voxel: Vector) -> bool {
         && !edges.into_iter().any(|edge| units.into_iter().any(|unit| apart(cross(edge, unit))))
 }
 
+#[inline]
 fn interval(values: impl Iterator<Item = i128>) -> (i128, i128) {
     values.fold((i128::MAX, i128::MIN), |(low, high), v| (low.min(v), high.max(v)))
 }

@@ -1,8 +1,8 @@
 //! The tests of triangles of a few voxels in f32, sixteen triangles at a time, and which of them rounding may have decided.
 //!
 //! Half a voxel is the unit, and the middle of a cuboid of voxels the origin, so that voxels' centres are whole numbers `p`
-//! with `|p| < D`, for `D` voxels along an axis, and corners are exact, with `|v| <= D <= 4`. Let `m` be the longest side of a triangle's box
-//! and `u = 2^-24` the most by which a sum or product of floats is off, relative to it.
+//! with `|p| < D`, for `D` voxels along an axis, and corners are exact, with `|v| <= D <= 4`. Let `m` be the longest side of
+//! a triangle's box and `u = 2^-24` the most by which a sum or product of floats is off, relative to it.
 //!
 //! - Edges `e` are exact, with `|e| <= m`. A component of the normal, `p - q` of two products, is off by at most
 //!   `u (|p| + |q| + |p - q|)`, so that its sign is right from `8 u (|p| + |q|)` on.
@@ -22,7 +22,8 @@ use super::rule::SurfaceRule;
 /// The longest side of a cuboid.
 const MOST: usize = 4;
 
-/// Voxels of a cuboid of `A` by `B` by `C` in two halves: voxel `(x, y, z)` is bit `(B x + y) C + z`, from 32 on in the second.
+/// Voxels of a cuboid of `A` by `B` by `C` in two halves: voxel `(x, y, z)` is bit `(B x + y) C + z`, from 32 on in the
+/// second.
 pub(super) type Bits = [i32; 2];
 
 /// [`Bits`] for each lane.

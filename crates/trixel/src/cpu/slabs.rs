@@ -81,12 +81,12 @@ mod parallel {
 
     /// The smallest slab has this part of a thread's work.
     const SMALLEST: i64 = 16;
-    /// Pieces of the triangles a thread, within limits of triangles.
+    /// The largest piece is this part of a thread's triangles, within limits of triangles.
     const PIECES: u64 = 64;
     const PIECE: RangeInclusive<u64> = 1 << 8..=1 << 11;
-    /// Pieces are at most this part of what is left, so that threads are done at about the same time.
+    /// No piece is more than this part of what is left of a thread's, so that all are done at about the same time.
     const LAST_PIECES: u64 = 16;
-    /// They are whole blocks, so that no vector is half empty.
+    /// But all except the last are whole blocks, so that no vector is half empty.
     const WHOLE: u64 = BLOCK as u64;
     /// Pieces of the grid a thread, when copies are put together.
     const PIECES_OF_GRID: usize = 8;
@@ -405,6 +405,7 @@ mod parallel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cpu::triangles::BLOCK;
     use crate::cpu::{CpuBackend, Instructions};
     use crate::{Backend, Grid, Job, Mode, scene};
 
@@ -427,7 +428,7 @@ mod tests {
         }
     }
 
-    /// Whichever thread comes when.
+    /// In whatever order threads come; and pieces are whole blocks, except one a thread.
     #[test]
     fn every_triangle_is_in_one_piece() {
         for (triangles, threads) in [(0, 2), (1, 3), (63, 1), (1000, 2), (100_000, 7), (1_000_003, 2)] {
@@ -435,9 +436,12 @@ mod tests {
             let mut times = vec![0; triangles as usize];
             // Some come more often than others.
             let turns = (0..threads).chain(threads / 2..threads).cycle();
+            let mut not_whole = 0;
             for piece in turns.map_while(|thread| parts.next(thread)) {
+                not_whole += usize::from(piece.len() % BLOCK != 0);
                 times[piece].iter_mut().for_each(|times| *times += 1);
             }
+            assert!(not_whole <= threads, "{triangles}, {threads} threads");
             assert!(parts.all_taken() && times.iter().all(|&times| times == 1), "{triangles}, {threads} threads");
         }
     }

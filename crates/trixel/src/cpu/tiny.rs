@@ -223,7 +223,8 @@ fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     sink.cubes::<_, SIDE>(&places, &voxels, used(count));
 }
 
-/// The voxels of cubes of `SIDE` that triangles meet whose boxes are one layer, or of a row of voxels one of its two.
+/// The voxels of cubes of `SIDE` that triangles meet whose boxes are one layer: of those inside the boxes. A row of voxels is
+/// in two layers, of which either will do.
 #[inline(always)]
 fn in_layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
@@ -268,7 +269,7 @@ fn used(count: usize) -> Lanes {
     (1 << count) - 1
 }
 
-/// Where layers of voxels are across x or z.
+/// Where layers of voxels are across x or z, or else across y.
 struct Layer<V: Simd> {
     across_x: mask32x16<V>,
     across_z: mask32x16<V>,
@@ -499,10 +500,13 @@ mod tests {
         for round in 0..ROUNDS {
             let mut rows = in_cube(&mut random, round, i64::try_from(SIDE).unwrap());
             for lane in 0..LANES {
+                // Into one of the voxels along an axis, each corner to anywhere in it.
                 let axis = usize::try_from(random.range(0, 2)).unwrap();
+                let voxel = i32::try_from(random.range(0, i64::try_from(SIDE).unwrap() - 1)).unwrap();
+                let steps = i32::try_from(STEPS_PER_VOXEL).unwrap();
                 for corner in &mut rows {
                     let step = &mut corner[axis][lane];
-                    *step = (*step).min(i32::try_from(STEPS_PER_VOXEL).unwrap() - 1);
+                    *step = voxel * steps + 1 + (*step - 1) % (steps - 1);
                 }
             }
             let corners = vectors(simd, &rows);
