@@ -15,7 +15,7 @@
 use fearless_simd::{Simd, i32x16, prelude::*};
 
 use super::number::SMALL_EXTENT;
-use super::rule::{Rule, Solid, SurfaceRule};
+use super::rule::{Solid, SurfaceRule, VectorRule};
 use super::sink::{CubeSink, Sink};
 use super::triangles::{Block, LANES, Lanes, Queue, Selected, Vectors, base};
 use super::{crossings, large, rows, tiny};
@@ -37,9 +37,18 @@ impl VoxelBox {
         Self { low: [low(0), low(1), low(2)], high: [high(0), high(1), high(2)] }
     }
 
+    /// The columns whose centres are inside the triangle's closed bounding box, between the bottom and the top of `clip`.
+    #[inline(always)]
+    pub(super) fn below_and_above([a, b, c]: &[[i64; 3]; 3], clip: &Self) -> Self {
+        const HALF: i64 = (STEPS_PER_VOXEL / 2) as i64;
+        let low = |i: usize| (a[i].min(b[i]).min(c[i]) + HALF - 1) >> STEP_BITS;
+        let high = |i: usize| (a[i].max(b[i]).max(c[i]) - HALF) >> STEP_BITS;
+        Self { low: [low(0), low(1), clip.low[2]], high: [high(0), high(1), clip.high[2]] }
+    }
+
     /// The part inside `other`, or `None` if there is none.
     #[inline(always)]
-    fn clipped(&self, other: &Self) -> Option<Self> {
+    pub(super) fn clipped(&self, other: &Self) -> Option<Self> {
         let low = |i: usize| self.low[i].max(other.low[i]);
         let high = |i: usize| self.high[i].min(other.high[i]);
         let (low, high) = ([low(0), low(1), low(2)], [high(0), high(1), high(2)]);
@@ -51,19 +60,12 @@ impl VoxelBox {
     pub(super) fn extent(&self) -> [i64; 3] {
         [self.high[0] - self.low[0], self.high[1] - self.low[1], self.high[2] - self.low[2]]
     }
-
-    /// Whether it is beyond small triangles' paths.
-    #[inline(always)]
-    fn is_long(&self) -> bool {
-        let extent = self.extent();
-        extent[0].max(extent[1]).max(extent[2]) > SMALL_EXTENT
-    }
 }
 
-/// Buffers that one thread keeps between triangles.
+/// What one thread keeps between triangles that are not tiny.
 #[derive(Default)]
-struct Scratch {
-    rows: rows::Scratch,
+struct Others {
+    rows: rows::Rows,
     large: large::Scratch,
 }
 
@@ -85,7 +87,7 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
     clip: &VoxelBox,
     sink: &mut S,
 ) {
-    let mut scratch = Scratch::default();
+    let mut others = Others::default();
     let mut waiting = Waiting::new();
     let base = base(mesh, clip);
     let near = NearClip::new(simd, clip, base);
@@ -173,13 +175,11 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
                     );
                 }
             }
-            let others = meets & !settled & !two & !tiny;
+            let not_tiny = meets & !settled & !two & !tiny;
             if S::LEAVES {
-                leave(triangles, at, others, &low, &high, &near, sink);
-            } else {
-                for lane in set_bits(others) {
-                    not_tiny(simd, rule, triangles, at + lane, clip, sink, &mut scratch);
-                }
+                leave(triangles, at, not_tiny, &low, &high, &near, sink);
+            } else if not_tiny != 0 {
+                others.send(simd, rule, triangles, at, &corners, not_tiny, clip, &near, sink);
             }
         },
     );
@@ -192,6 +192,7 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
     tiny::flush_flats::<_, _, 4>(simd, rule, &mut waiting.flat_fours, true, &near, sink);
     tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, true, &near, sink);
     tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, true, &near, sink);
+    others.finish(simd, rule, &near, sink);
 }
 
 /// Leaves the triangles in `lanes` of the vector that starts with the `at`th.
@@ -221,43 +222,100 @@ fn leave<V: Simd>(
 pub(super) fn surface_not_tiny<'a, V: Simd, R: SurfaceRule>(
     simd: V,
     rule: &R,
+    mesh: &LatticeMesh<'_>,
     pieces: impl Iterator<Item = Selected<'a>>,
     clip: &VoxelBox,
     sink: &mut impl Sink,
 ) {
-    let mut scratch = Scratch::default();
-    for triangles in pieces {
-        for i in 0..triangles.len() {
-            not_tiny(simd, rule, &triangles, i, clip, sink, &mut scratch);
+    let mut others = Others::default();
+    let base = base(mesh, clip);
+    let near = NearClip::new(simd, clip, base);
+    for_each_vector(
+        simd,
+        pieces,
+        base,
+        sink,
+        #[inline(always)]
+        |sink, triangles, at, corners, lanes| {
+            let [low, high] = corners.boxes();
+            let meets = near.meets(&low, &high) & lanes;
+            if meets != 0 {
+                others.send(simd, rule, triangles, at, &corners, meets, clip, &near, sink);
+            }
+        },
+    );
+    others.finish(simd, rule, &near, sink);
+}
+
+impl Others {
+    /// Sends the voxels of the triangles in `lanes` of the vector that starts with the `at`th, some perhaps later.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "a step of the kernel")]
+    fn send<V: Simd, R: VectorRule>(
+        &mut self,
+        simd: V,
+        rule: &R,
+        triangles: &Selected<'_>,
+        at: usize,
+        corners: &Vectors<V>,
+        mut lanes: Lanes,
+        clip: &VoxelBox,
+        near: &NearClip<V>,
+        sink: &mut impl Sink,
+    ) {
+        let [low, high] = corners.boxes();
+        let extent = [high[0] - low[0], high[1] - low[1], high[2] - low[2]];
+        if R::TOUCH_IS_ENOUGH {
+            // Strictly inside a row of voxels.
+            let row = (extent[0].min(1) + extent[1].min(1) + extent[2].min(1)).simd_le(1).to_bitmask() & lanes;
+            if row != 0 {
+                send_rows(row, &low, &high, near, sink);
+                lanes &= !row;
+            }
         }
+        #[expect(clippy::cast_possible_truncation, reason = "63")]
+        let short = extent[0].max(extent[1]).max(extent[2]).simd_le(SMALL_EXTENT as i32).to_bitmask();
+        let small = if rule.fits_small() { short & lanes } else { 0 };
+        if small != 0 && self.rows.push(simd, corners, small) {
+            simd.vectorize(
+                #[inline(always)]
+                || self.rows.send(simd, rule, false, near, sink),
+            );
+        }
+        for lane in set_bits(lanes & !small) {
+            large::voxelize(simd.level(), rule, &triangles.corners(at + lane), clip, sink, &mut self.large);
+        }
+    }
+
+    /// Sends what waits.
+    #[inline(always)]
+    fn finish<V: Simd, R: VectorRule>(&mut self, simd: V, rule: &R, near: &NearClip<V>, sink: &mut impl Sink) {
+        simd.vectorize(
+            #[inline(always)]
+            || self.rows.send(simd, rule, true, near, sink),
+        );
     }
 }
 
-/// Sends the voxels of the `i`th triangle in a surface mode.
+/// Sends all voxels inside the clip of the boxes of the lanes in `mask`.
 #[inline(always)]
-fn not_tiny<V: Simd, R: SurfaceRule>(
-    simd: V,
-    rule: &R,
-    triangles: &Selected<'_>,
-    i: usize,
-    clip: &VoxelBox,
+fn send_rows<V: Simd>(
+    mask: Lanes,
+    low: &[i32x16<V>; 3],
+    high: &[i32x16<V>; 3],
+    near: &NearClip<V>,
     sink: &mut impl Sink,
-    scratch: &mut Scratch,
 ) {
-    let triangle = triangles.corners(i);
-    let around = VoxelBox::around(&triangle);
-    let Some(clipped) = around.clipped(clip) else { return };
-    let extent = around.extent();
-    if R::TOUCH_IS_ENOUGH && extent[0].min(1) + extent[1].min(1) + extent[2].min(1) <= 1 {
-        // Strictly inside a row of voxels.
-        for x in clipped.low[0]..=clipped.high[0] {
-            for y in clipped.low[1]..=clipped.high[1] {
-                sink.run(x, y, clipped.low[2], clipped.high[2]);
+    let from = [*low[0].max(near.low[0]), *low[1].max(near.low[1]), *low[2].max(near.low[2])];
+    let to = [*high[0].min(near.high[0]), *high[1].min(near.high[1]), *high[2].min(near.high[2])];
+    for lane in set_bits(mask) {
+        let along = |i: usize, of: &[i32; LANES]| near.base[i] + i64::from(of[lane % LANES]);
+        for x in along(0, &from[0])..=along(0, &to[0]) {
+            for y in along(1, &from[1])..=along(1, &to[1]) {
+                sink.run(x, y, along(2, &from[2]), along(2, &to[2]));
             }
         }
-        return;
     }
-    by_size(simd, rule, &triangle, &around, &clipped, sink, scratch);
 }
 
 /// Calls `each` with the sink, and of every vector of triangles the piece they are of, the number of the first, the corners
@@ -376,7 +434,7 @@ pub(super) fn solid<'a, V: Simd, S: Sink>(
     clip: &VoxelBox,
     sink: &mut S,
 ) {
-    let mut scratch = Scratch::default();
+    let mut others = Others::default();
     // Those with centres of at most two by two columns, and of four by four.
     let (mut twos, mut fours) = (Queue::EMPTY, Queue::EMPTY);
     let base = base(mesh, clip);
@@ -416,83 +474,47 @@ pub(super) fn solid<'a, V: Simd, S: Sink>(
             }
             if S::LEAVES {
                 leave(triangles, at, some & !tiny, &low, &high, &near, sink);
-            } else {
-                for lane in set_bits(some & !tiny) {
-                    centre(simd, rule, triangles, at + lane, clip, sink, &mut scratch);
-                }
+            } else if some & !tiny != 0 {
+                others.send(simd, rule, triangles, at, &corners, some & !tiny, clip, &near, sink);
             }
         },
     );
     crossings::flush::<_, 2>(simd, &mut twos, true, &near, clip, sink);
     crossings::flush::<_, 4>(simd, &mut fours, true, &near, clip, sink);
+    others.finish(simd, rule, &near, sink);
 }
 
-/// Sends the voxels of mode sliced, or the toggles of mode solid, inside `clip` to `sink`: one triangle after the other.
+/// Sends the voxels of mode sliced, or the toggles of mode solid, inside `clip` to `sink`, as if no triangle were tiny.
 #[inline(always)]
-pub(super) fn centres<'a, V: Simd, R: Rule>(
+pub(super) fn centres<'a, V: Simd, R: VectorRule, S: Sink>(
     simd: V,
     rule: &R,
-    mut pieces: impl Iterator<Item = Selected<'a>>,
-    clip: &VoxelBox,
-    sink: &mut impl Sink,
-) {
-    let mut scratch = Scratch::default();
-    while !sink.is_full()
-        && let Some(triangles) = pieces.next()
-    {
-        for i in 0..triangles.len() {
-            centre(simd, rule, &triangles, i, clip, sink, &mut scratch);
-        }
-    }
-}
-
-/// Sends the voxels of the `i`th triangle in a mode that looks along z from voxel centres.
-#[inline(always)]
-fn centre<V: Simd, R: Rule, S: Sink>(
-    simd: V,
-    rule: &R,
-    triangles: &Selected<'_>,
-    i: usize,
+    mesh: &LatticeMesh<'_>,
+    pieces: impl Iterator<Item = Selected<'a>>,
     clip: &VoxelBox,
     sink: &mut S,
-    scratch: &mut Scratch,
 ) {
-    const HALF: i64 = (STEPS_PER_VOXEL / 2) as i64;
-    let triangle = triangles.corners(i);
-    let [a, b, c] = &triangle;
-    // The columns whose centres are inside the closed box: for small triangles mostly none.
-    let low = |i: usize| (a[i].min(b[i]).min(c[i]) - HALF + (2 * HALF - 1)) >> STEP_BITS;
-    let high = |i: usize| (a[i].max(b[i]).max(c[i]) - HALF) >> STEP_BITS;
-    let columns = VoxelBox {
-        low: [low(0).max(clip.low[0]), low(1).max(clip.low[1]), clip.low[2]],
-        high: [high(0).min(clip.high[0]), high(1).min(clip.high[1]), clip.high[2]],
-    };
-    if columns.low[0] <= columns.high[0] && columns.low[1] <= columns.high[1] {
-        if S::LEAVES {
-            sink.leave(triangles.number(i), [columns.low[0], columns.high[0]], columns.low[1]);
-        } else {
-            by_size(simd, rule, &triangle, &VoxelBox::around(&triangle), &columns, sink, scratch);
-        }
-    }
-}
-
-/// The path for a triangle that is not tiny.
-#[inline(always)]
-fn by_size<V: Simd, R: Rule>(
-    simd: V,
-    rule: &R,
-    triangle: &[[i64; 3]; 3],
-    around: &VoxelBox,
-    clipped: &VoxelBox,
-    sink: &mut impl Sink,
-    scratch: &mut Scratch,
-) {
-    if !around.is_long() && rule.fits_small() {
-        simd.vectorize(
-            #[inline(always)]
-            || rows::voxelize(simd, rule, triangle, around, clipped, sink, &mut scratch.rows),
-        );
-    } else {
-        large::voxelize(simd.level(), rule, triangle, around, clipped, sink, &mut scratch.large);
-    }
+    let mut others = Others::default();
+    let base = base(mesh, clip);
+    let near = NearClip::new(simd, clip, base);
+    for_each_vector(
+        simd,
+        pieces,
+        base,
+        sink,
+        #[inline(always)]
+        |sink, triangles, at, corners, lanes| {
+            let mut some = lanes;
+            for [low, high] in crossings::columns(&corners, &near) {
+                some &= low.simd_le(high).to_bitmask();
+            }
+            if S::LEAVES {
+                let [low, high] = corners.boxes();
+                leave(triangles, at, some, &low, &high, &near, sink);
+            } else if some != 0 {
+                others.send(simd, rule, triangles, at, &corners, some, clip, &near, sink);
+            }
+        },
+    );
+    others.finish(simd, rule, &near, sink);
 }

@@ -89,7 +89,7 @@ pub(super) struct Scratch {
     runs: Runs,
 }
 
-/// Sends the voxels of a triangle of any size inside `clipped` to the sink.
+/// Sends the voxels of a triangle of any size inside `clip` to the sink.
 ///
 /// Out of line: rare, and its 128-bit code would crowd the common paths.
 #[inline(never)]
@@ -97,11 +97,13 @@ pub(super) fn voxelize<R: Rule>(
     level: Level,
     rule: &R,
     triangle: &[[i64; 3]; 3],
-    around: &VoxelBox,
-    clipped: &VoxelBox,
+    clip: &VoxelBox,
     sink: &mut impl Sink,
     scratch: &mut Scratch,
 ) {
+    let around = VoxelBox::around(triangle);
+    let wanted = if R::SURFACE { around } else { VoxelBox::below_and_above(triangle, clip) };
+    let Some(clipped) = &wanted.clipped(clip) else { return };
     let extent = around.extent();
     if extent[0].max(extent[1]).max(extent[2]) <= MEDIUM_EXTENT && rule.fits_small() {
         runs::<i64, _>(level, rule, triangle, around.low, clipped, sink, scratch);

@@ -53,7 +53,7 @@ impl Painter {
             Mode::Thin => surface(self.level, &Thin, mesh, pieces, clip, &mut SetRuns(slab)),
             Mode::Sliced => {
                 let (rule, mut sink) = (Sliced { overlap: self.overlap }, SetRuns(slab));
-                dispatch!(self.level, simd => kernel::centres(simd, &rule, pieces, clip, &mut sink));
+                dispatch!(self.level, simd => kernel::centres(simd, &rule, mesh, pieces, clip, &mut sink));
             }
             Mode::Solid => {
                 let mut sink = ToggleRuns(slab);
@@ -85,7 +85,7 @@ impl Painter {
             Mode::Thin => surface(self.level, &Thin, mesh, pieces, grid, outbox),
             Mode::Sliced => {
                 let rule = Sliced { overlap: self.overlap };
-                dispatch!(self.level, simd => kernel::centres(simd, &rule, pieces, grid, outbox));
+                dispatch!(self.level, simd => kernel::centres(simd, &rule, mesh, pieces, grid, outbox));
             }
             Mode::Solid => dispatch!(self.level, simd => kernel::solid(simd, &Solid, mesh, pieces, grid, outbox)),
         }
@@ -112,15 +112,15 @@ impl Painter {
         let strips = (0..STRIPS).flat_map(|strip| outboxes.clone().map(move |outbox| outbox.triangles(slab, strip)));
         let pieces = strips.map(|numbers| Selected::listed(mesh, numbers));
         match self.mode {
-            Mode::Conservative => not_tiny(self.level, &Conservative, pieces, clip, &mut SetRuns(into)),
-            Mode::Thin => not_tiny(self.level, &Thin, pieces, clip, &mut SetRuns(into)),
+            Mode::Conservative => not_tiny(self.level, &Conservative, mesh, pieces, clip, &mut SetRuns(into)),
+            Mode::Thin => not_tiny(self.level, &Thin, mesh, pieces, clip, &mut SetRuns(into)),
             Mode::Sliced => {
                 let (rule, mut sink) = (Sliced { overlap: self.overlap }, SetRuns(into));
-                dispatch!(self.level, simd => kernel::centres(simd, &rule, pieces, clip, &mut sink));
+                dispatch!(self.level, simd => kernel::centres(simd, &rule, mesh, pieces, clip, &mut sink));
             }
             Mode::Solid => {
                 let mut sink = ToggleRuns(into);
-                dispatch!(self.level, simd => kernel::centres(simd, &Solid, pieces, clip, &mut sink));
+                dispatch!(self.level, simd => kernel::centres(simd, &Solid, mesh, pieces, clip, &mut sink));
             }
         }
     }
@@ -144,11 +144,12 @@ fn move_voxels(from: &mut [u64], to: &mut [u64]) {
 fn not_tiny<'a, R: SurfaceRule>(
     level: Level,
     rule: &R,
+    mesh: &LatticeMesh<'_>,
     pieces: impl Iterator<Item = Selected<'a>>,
     clip: &VoxelBox,
     sink: &mut SetRuns<'_>,
 ) {
-    dispatch!(level, simd => kernel::surface_not_tiny(simd, rule, pieces, clip, sink));
+    dispatch!(level, simd => kernel::surface_not_tiny(simd, rule, mesh, pieces, clip, sink));
 }
 
 fn surface<'a, R: SurfaceRule>(

@@ -1,19 +1,23 @@
 //! Triangles of a few voxels: row by row, eight columns of a row at a time, one a vector lane.
 //!
-//! For each x, the columns (x, y) that the xy projection allows get the run that the plane and the other two projections
-//! leave. All numbers are integers below 2^53 in f64; the quotients are floored exactly (see [`SMALL_EXTENT`]).
+//! What a triangle's tests need is found for eight triangles at a time ([`Tests`]). Then, for each x, the columns (x, y)
+//! that the xy projection allows get the run that the plane and the other two projections leave. All numbers are integers
+//! below 2^53 in f64; the quotients are floored exactly (see [`SMALL_EXTENT`]).
 //!
 //! [`SMALL_EXTENT`]: super::number::SMALL_EXTENT
 
-use fearless_simd::{Simd, f64x8, i64x8, prelude::*};
+use fearless_simd::{Simd, f64x8, i32x16, i64x8, mask32x16, prelude::*};
 
-use super::kernel::VoxelBox;
-use super::rule::Rule;
-use super::setup::{Constraint, Setup};
-use super::sink::Sink;
+use super::crossings;
+use super::kernel::NearClip;
+use super::rule::VectorRule;
+use super::sink::{Sink, turn};
+use super::tiny::{between, cross};
+use super::triangles::{self, Halves, Lanes, Queue, Vectors};
+use crate::lattice::STEP_BITS;
 use crate::volume::WORD_BITS;
 
-/// Columns judged at once.
+/// Columns judged at once, and triangles whose tests are found at once.
 const LANES: usize = 8;
 
 /// A number for each column `(x, y)` of eight by eight, at `8 x + y`.
@@ -25,8 +29,61 @@ const MOST: usize = 64;
 /// Beyond any index of a voxel, and exact.
 const FAR: f64 = (1u64 << 40) as f64;
 
-/// Buffers that one thread keeps between triangles.
-pub(super) struct Scratch {
+/// Triangles that wait for their rows, and buffers.
+pub(super) struct Rows {
+    waiting: Queue,
+    tests: Tests,
+    scratch: Scratch,
+}
+
+impl Default for Rows {
+    fn default() -> Self {
+        Self { waiting: Queue::EMPTY, tests: Tests::NONE, scratch: Scratch::NONE }
+    }
+}
+
+impl Rows {
+    /// Adds the triangles in `lanes`, of at most [`SMALL_EXTENT`](super::number::SMALL_EXTENT) voxels; `true` when
+    /// [`Self::send`] must follow before the next ones.
+    #[inline(always)]
+    pub(super) fn push<V: Simd>(&mut self, simd: V, corners: &Vectors<V>, lanes: Lanes) -> bool {
+        self.waiting.push(simd, corners, lanes)
+    }
+
+    /// Sends the runs of the waiting triangles inside the clip: of as many as fill vectors, or of all.
+    #[inline(always)]
+    pub(super) fn send<V: Simd, R: VectorRule>(
+        &mut self,
+        simd: V,
+        rule: &R,
+        all: bool,
+        clip: &NearClip<V>,
+        sink: &mut impl Sink,
+    ) {
+        let Self { waiting, tests, scratch } = self;
+        let mut first = 0;
+        loop {
+            let count = waiting.lanes(first, all);
+            if count == 0 {
+                break;
+            }
+            let (boxes, halves) = Boxes::new::<_, R>(simd, &waiting.vectors(simd, first), clip);
+            for (half, corners) in halves.iter().enumerate() {
+                let lanes = LANES * half..count.min(LANES * (half + 1));
+                if !lanes.is_empty() {
+                    tests.find(simd, rule, corners);
+                }
+                for lane in lanes {
+                    send::<_, R>(simd, tests, &boxes, lane, sink, scratch);
+                }
+            }
+            first += triangles::LANES;
+        }
+        waiting.keep(simd, first);
+    }
+}
+
+struct Scratch {
     /// The z ranges (low, high) that the two projections containing z leave, for every x and y of the clipped box.
     by_x: [[f64; MOST]; 2],
     by_y: [[f64; MOST]; 2],
@@ -35,9 +92,135 @@ pub(super) struct Scratch {
     ends: Tile,
 }
 
-impl Default for Scratch {
-    fn default() -> Self {
-        Self { by_x: [[0.0; MOST]; 2], by_y: [[0.0; MOST]; 2], starts: [0; LANES * LANES], ends: [0; LANES * LANES] }
+impl Scratch {
+    const NONE: Self =
+        Self { by_x: [[0.0; MOST]; 2], by_y: [[0.0; MOST]; 2], starts: [0; LANES * LANES], ends: [0; LANES * LANES] };
+}
+
+/// Where the triangles of a vector are. Where one is `turned`, x and y are exchanged.
+struct Boxes {
+    base: [i64; 3],
+    /// The lowest voxel, from the base.
+    low: [[i32; triangles::LANES]; 3],
+    /// The part inside the clip, from the lowest voxel.
+    from: [[i32; triangles::LANES]; 3],
+    to: [[i32; triangles::LANES]; 3],
+    turned: Lanes,
+}
+
+impl Boxes {
+    /// With the corners, in steps from the low corners of the boxes.
+    #[inline(always)]
+    fn new<V: Simd, R: VectorRule>(simd: V, corners: &Vectors<V>, clip: &NearClip<V>) -> (Self, Halves<V>) {
+        let [mut low, high] = corners.boxes();
+        let (mut from, mut to) = if R::SURFACE {
+            (
+                [low[0].max(clip.low[0]), low[1].max(clip.low[1]), low[2].max(clip.low[2])],
+                [high[0].min(clip.high[0]), high[1].min(clip.high[1]), high[2].min(clip.high[2])],
+            )
+        } else {
+            let [[x, x_last], [y, y_last]] = crossings::columns(corners, clip);
+            ([x, y, clip.low[2]], [x_last, y_last, clip.high[2]])
+        };
+        let mut corners = *corners;
+        let mut turned = 0;
+        // Centres on edges are told by x before y, which turning would change.
+        if R::SURFACE {
+            // Rows across the shorter side, so that there are few and they fill the lanes.
+            let across = (to[0] - from[0]).simd_gt(to[1] - from[1]);
+            turned = across.to_bitmask();
+            let [v0, v1, v2] = corners.0;
+            corners = Vectors([exchange(across, v0), exchange(across, v1), exchange(across, v2)]);
+            (low, from, to) = (exchange(across, low), exchange(across, from), exchange(across, to));
+        }
+        let halves = corners.halves(simd, [low[0] << STEP_BITS, low[1] << STEP_BITS, low[2] << STEP_BITS], 1.0);
+        let boxes = Self {
+            base: clip.base,
+            low: [*low[0], *low[1], *low[2]],
+            from: [*(from[0] - low[0]), *(from[1] - low[1]), *(from[2] - low[2])],
+            to: [*(to[0] - low[0]), *(to[1] - low[1]), *(to[2] - low[2])],
+            turned,
+        };
+        (boxes, halves)
+    }
+}
+
+/// Exchanges x and y.
+#[inline(always)]
+fn exchange<V: Simd>(across: mask32x16<V>, [x, y, z]: [i32x16<V>; 3]) -> [i32x16<V>; 3] {
+    [across.select(y, x), across.select(x, y), z]
+}
+
+/// What the tests of eight triangles start from, number by number, in voxels from the low corners of their boxes.
+struct Tests {
+    /// Of the projections to xy, xz and yz, the edges' na, nb and t: `na a + nb b >= t`.
+    edges: [[[[f64; LANES]; 3]; 3]; 3],
+    /// The normal, turned upwards.
+    n: [[f64; LANES]; 3],
+    /// The plane's upper bound, and how far its lower one is below: in all, and as a multiple of the normal's z and a rest.
+    d2: [f64; LANES],
+    thickness: [f64; LANES],
+    thickness_whole: [f64; LANES],
+    thickness_rest: [f64; LANES],
+}
+
+/// The axes of a projection, and the one along which it looks.
+const PROJECTIONS: [[usize; 3]; 3] = [[0, 1, 2], [0, 2, 1], [1, 2, 0]];
+
+impl Tests {
+    const NONE: Self = {
+        const ZEROS: [f64; LANES] = [0.0; LANES];
+        Self {
+            edges: [[[ZEROS; 3]; 3]; 3],
+            n: [ZEROS; 3],
+            d2: ZEROS,
+            thickness: ZEROS,
+            thickness_whole: ZEROS,
+            thickness_rest: ZEROS,
+        }
+    };
+
+    /// For corners in steps.
+    #[inline(always)]
+    fn find<V: Simd, R: VectorRule>(&mut self, simd: V, rule: &R, v: &[[f64x8<V>; 3]; 3]) {
+        let one = f64x8::splat(simd, 1.0);
+        let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
+        let n = [cross(&e, 1, 2), cross(&e, 2, 0), cross(&e, 0, 1)];
+        for (tests, [a, b, c]) in self.edges.iter_mut().zip(PROJECTIONS) {
+            // Inward normals point left where the projection turns left.
+            let in_order = if b == (a + 1) % 3 { one } else { -one };
+            let side = in_order.copysign(n[c]) * in_order;
+            for k in 0..3 {
+                let (na, nb) = (-e[k][b] * side, e[k][a] * side);
+                let t = rule.edges(simd, na, nb, na * v[k][a] + nb * v[k][b]);
+                na.store_slice(&mut tests[k][0]);
+                nb.store_slice(&mut tests[k][1]);
+                t.store_slice(&mut tests[k][2]);
+            }
+        }
+        let up = one.copysign(n[2]);
+        let n = [n[0] * up, n[1] * up, n[2] * up];
+        let (d1, d2) = rule.planes(simd, n, v[0]);
+        let thickness = d2 - d1;
+        // Where the plane is along z, neither is used.
+        let whole = (thickness / n[2]).floor();
+        for i in 0..3 {
+            n[i].store_slice(&mut self.n[i]);
+        }
+        d2.store_slice(&mut self.d2);
+        thickness.store_slice(&mut self.thickness);
+        whole.store_slice(&mut self.thickness_whole);
+        (thickness - whole * n[2]).store_slice(&mut self.thickness_rest);
+    }
+
+    /// The edges of a triangle in a projection.
+    #[inline(always)]
+    fn edges(&self, projection: usize, lane: usize) -> [Edge; 3] {
+        let edge = |k: usize| {
+            let [na, nb, t] = &self.edges[projection][k];
+            Edge { na: na[lane], nb: nb[lane], t: t[lane] }
+        };
+        [edge(0), edge(1), edge(2)]
     }
 }
 
@@ -47,27 +230,6 @@ struct Edge {
     na: f64,
     nb: f64,
     t: f64,
-}
-
-impl Edge {
-    #[inline(always)]
-    #[expect(clippy::cast_precision_loss, reason = "below 2^53")]
-    fn new(edge: Constraint<i64>) -> Self {
-        Self { na: edge.na as f64, nb: edge.nb as f64, t: edge.t as f64 }
-    }
-}
-
-#[inline(always)]
-fn projection<R: Rule>(setup: &Setup<i64>, rule: &R, a: usize, b: usize) -> [Edge; 3] {
-    let [e0, e1, e2] = setup.projection(rule, a, b);
-    [Edge::new(e0), Edge::new(e1), Edge::new(e2)]
-}
-
-/// The index of a voxel as a float.
-#[inline(always)]
-#[expect(clippy::cast_precision_loss, reason = "far below 2^53")]
-fn index(i: i64) -> f64 {
-    i as f64
 }
 
 /// 0, 1, 2, ... from `start` on.
@@ -93,43 +255,46 @@ fn z_range<V: Simd>(simd: V, edges: &[Edge; 3], a: f64x8<V>) -> (f64x8<V>, f64x8
     (low, high)
 }
 
-/// Sends the runs of a triangle of at most [`SMALL_EXTENT`](super::number::SMALL_EXTENT) voxels inside `clipped`.
+/// Sends the runs of the triangle of a lane inside its box.
 #[inline(always)]
-pub(super) fn voxelize<V: Simd, R: Rule>(
+fn send<V: Simd, R: VectorRule>(
     simd: V,
-    rule: &R,
-    triangle: &[[i64; 3]; 3],
-    around: &VoxelBox,
-    clipped: &VoxelBox,
+    tests: &Tests,
+    boxes: &Boxes,
+    lane: usize,
     sink: &mut impl Sink,
     scratch: &mut Scratch,
 ) {
-    let base = around.low;
-    let setup = Setup::<i64>::new(triangle, base);
-    if !R::SURFACE && setup.normal[2] == 0 {
+    let number = |of: &[[i32; triangles::LANES]; 3], i: usize| of[i][lane % triangles::LANES];
+    let from = [number(&boxes.from, 0), number(&boxes.from, 1), number(&boxes.from, 2)];
+    let to = [number(&boxes.to, 0), number(&boxes.to, 1), number(&boxes.to, 2)];
+    let (low, high) = (from.map(f64::from), to.map(f64::from));
+    let turned = boxes.turned >> lane & 1 != 0;
+    let [x, y] = turn(turned, [boxes.base[0], boxes.base[1]]);
+    let at = |i: usize, base: i64| base + i64::from(number(&boxes.low, i));
+    let base = [at(0, x), at(1, y), at(2, boxes.base[2])];
+    let lane = lane % LANES;
+    let n = [tests.n[0][lane], tests.n[1][lane], tests.n[2][lane]];
+    if !R::SURFACE && n[2] == 0.0 {
         return;
     }
-    let from_base = |p: [i64; 3]| [index(p[0] - base[0]), index(p[1] - base[1]), index(p[2] - base[2])];
-    let (low, high) = (from_base(clipped.low), from_base(clipped.high));
-    let xy = projection(&setup, rule, 0, 1);
-    let (up, d1, d2) = setup.plane(rule);
-    #[expect(clippy::cast_precision_loss, reason = "below 2^53")]
-    let (n, d2, thickness) = ([up[0] as f64, up[1] as f64, up[2] as f64], d2 as f64, (d2 - d1) as f64);
-    let thickness_whole = if n[2] > 0.0 { (thickness / n[2]).floor() } else { 0.0 };
-    let thickness_rest = thickness - thickness_whole * n[2];
+    let (d2, thickness) = (tests.d2[lane], tests.thickness[lane]);
+    let (thickness_whole, thickness_rest) = (tests.thickness_whole[lane], tests.thickness_rest[lane]);
+    let xy = tests.edges(0, lane);
 
     let Scratch { by_x, by_y, starts, ends } = scratch;
     if R::SURFACE {
-        fill(simd, &projection(&setup, rule, 0, 2), low[0], high[0], by_x);
-        fill(simd, &projection(&setup, rule, 1, 2), low[1], high[1], by_y);
+        fill(simd, &tests.edges(1, lane), low[0], high[0], by_x);
+        fill(simd, &tests.edges(2, lane), low[1], high[1], by_y);
     }
 
     let (zero, one) = (f64x8::splat(simd, 0.0), f64x8::splat(simd, 1.0));
     let (box_low, box_high) = (f64x8::splat(simd, low[2]), f64x8::splat(simd, high[2]));
     // Runs are seen from the word in which the lowest begins.
-    let start_z = clipped.low[2] & !i64::from(WORD_BITS - 1);
-    let to_word = f64x8::splat(simd, index(base[2] - start_z));
-    let last_z = clipped.high[2] - start_z;
+    let start_z = (base[2] + i64::from(from[2])) & !i64::from(WORD_BITS - 1);
+    #[expect(clippy::cast_precision_loss, reason = "within a grid")]
+    let to_word = f64x8::splat(simd, (base[2] - start_z) as f64);
+    let last_z = base[2] + i64::from(to[2]) - start_z;
     let mut y_start = low[1];
     let mut first = 0;
     while y_start <= high[1] {
@@ -182,8 +347,8 @@ pub(super) fn voxelize<V: Simd, R: Rule>(
                 row += 1;
             }
             #[expect(clippy::cast_possible_truncation, reason = "indices")]
-            let (gx, gy) = (x_start as i64 + base[0], y_start as i64 + base[1]);
-            sink.tile([gx, gy, start_z], tile, starts, ends, last_z);
+            let [x, y] = turn(turned, [x_start as i64 + base[0], y_start as i64 + base[1]]);
+            sink.tile([x, y, start_z], turned, tile, starts, ends, last_z);
             x_start += 8.0;
             first_row += LANES;
         }

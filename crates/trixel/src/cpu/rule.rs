@@ -11,6 +11,9 @@ use crate::lattice::STEPS_PER_VOXEL;
 /// S, the lattice steps of a voxel.
 const S: i64 = STEPS_PER_VOXEL as i64;
 
+/// Half a voxel.
+const HALF: f64 = STEPS_PER_VOXEL as f64 / 2.0;
+
 /// What distinguishes one mode from another.
 pub(super) trait Rule: Copy + Send + Sync {
     /// Whether the two projections that contain z constrain the run, and the triangle's box does; otherwise the plane
@@ -37,17 +40,23 @@ pub(super) trait Rule: Copy + Send + Sync {
     fn plane<T: Int>(&self, n: [T; 3], v0: [i64; 3]) -> (T, T);
 }
 
-/// A surface mode's tests for triangles of at most four voxels along each axis, so small that floats are exact.
-pub(super) trait SurfaceRule: Rule {
+/// A mode's thresholds for eight triangles at a time, of at most 2^22 steps along each axis.
+pub(super) trait VectorRule: Rule {
+    /// [`Rule::edge`].
+    fn edges<V: Simd>(&self, simd: V, na: f64x8<V>, nb: f64x8<V>, nv: f64x8<V>) -> f64x8<V>;
+
+    /// [`Rule::plane`], with a normal turned either way.
+    fn planes<V: Simd>(&self, simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>);
+}
+
+/// A surface mode's tests, seen from voxels' centres.
+pub(super) trait SurfaceRule: VectorRule {
     /// How far beyond an edge's line a voxel's centre passes, for the absolute values of the edge's normal in a
     /// projection: times half a voxel.
     fn centre_reach<V: Simd, F: SimdFloat<V>>(&self, na: F, nb: F) -> F;
 
     /// How far from the plane a voxel's centre passes, for the absolute values of the normal: times half a voxel.
     fn centre_plane_reach<V: Simd, F: SimdFloat<V>>(&self, n: [F; 3]) -> F;
-
-    /// `(d1, d2)` for the normal `n`, oriented either way, and the corner `v0`, at most 2^18 in each coordinate.
-    fn plane_bounds<V: Simd>(&self, simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>);
 }
 
 /// N.p and N.r / S for `v0 = S p + r` with r within half a voxel of 0. With |N_i| at most 2^36 no term reaches 2^53.
@@ -62,6 +71,49 @@ pub(super) fn split_centred<V: Simd>(n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f6
     let whole = n[0] * p[0] + n[1] * p[1] + n[2] * p[2];
     let rest = n[0] * (v0[0] - p[0] * steps) + n[1] * (v0[1] - p[1] * steps) + n[2] * (v0[2] - p[2] * steps);
     (whole, rest * (1.0 / steps))
+}
+
+/// [`split_centred`] for |N_i| below 2^44 and |v0| below 2^23: the normal is split into multiples of S, whose products with
+/// r are whole, and the rest.
+#[inline(always)]
+fn split_long<V: Simd>(n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+    let steps = f64::from(STEPS_PER_VOXEL);
+    let mut whole = n[0] * 0.0;
+    let mut rest = whole;
+    for i in 0..3 {
+        let p = (v0[i] * (1.0 / steps)).round_ties_even();
+        let r = v0[i] - p * steps;
+        let multiples = (n[i] * (1.0 / steps)).floor();
+        whole += n[i] * p + multiples * r;
+        rest += (n[i] - multiples * steps) * r;
+    }
+    (whole, rest * (1.0 / steps))
+}
+
+/// [`VectorRule::edges`] of a surface mode.
+#[inline(always)]
+fn within_edges<V: Simd, R: SurfaceRule>(rule: &R, na: f64x8<V>, nb: f64x8<V>, nv: f64x8<V>) -> f64x8<V> {
+    let reach = na + nb + rule.centre_reach(na.abs(), nb.abs());
+    ((nv - reach * HALF) * (1.0 / f64::from(STEPS_PER_VOXEL))).ceil()
+}
+
+/// [`VectorRule::planes`] of a surface mode.
+#[inline(always)]
+fn within_planes<V: Simd, R: SurfaceRule>(rule: &R, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+    let (whole, rest) = split_long(n, [v0[0] - HALF, v0[1] - HALF, v0[2] - HALF]);
+    let reach = rule.centre_plane_reach([n[0].abs(), n[1].abs(), n[2].abs()]) * 0.5;
+    let reach_whole = reach.floor();
+    let reach_rest = reach - reach_whole;
+    (whole - reach_whole + (rest - reach_rest).ceil(), whole + reach_whole + (rest + reach_rest).floor())
+}
+
+/// [`centre_edge`] of eight triangles.
+#[inline(always)]
+fn centre_edges<V: Simd>(simd: V, na: f64x8<V>, nb: f64x8<V>, nv: f64x8<V>) -> f64x8<V> {
+    let (zero, one) = (f64x8::splat(simd, 0.0), f64x8::splat(simd, 1.0));
+    let inclusive = na.simd_gt(zero) | (na.simd_eq(zero) & nb.simd_gt(zero));
+    let shift = inclusive.select(zero, one);
+    ((nv - (na + nb) * HALF + shift) * (1.0 / f64::from(STEPS_PER_VOXEL))).ceil()
 }
 
 /// `N.p + floor or ceil of the rest`, where `v0 = S p + rest`: keeps the products small. Gives N.p and N.(rest + shift).
@@ -106,6 +158,18 @@ impl Rule for Conservative {
     }
 }
 
+impl VectorRule for Conservative {
+    #[inline(always)]
+    fn edges<V: Simd>(&self, _simd: V, na: f64x8<V>, nb: f64x8<V>, nv: f64x8<V>) -> f64x8<V> {
+        within_edges(self, na, nb, nv)
+    }
+
+    #[inline(always)]
+    fn planes<V: Simd>(&self, _simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+        within_planes(self, n, v0)
+    }
+}
+
 impl SurfaceRule for Conservative {
     #[inline(always)]
     fn centre_reach<V: Simd, F: SimdFloat<V>>(&self, na: F, nb: F) -> F {
@@ -115,15 +179,6 @@ impl SurfaceRule for Conservative {
     #[inline(always)]
     fn centre_plane_reach<V: Simd, F: SimdFloat<V>>(&self, n: [F; 3]) -> F {
         n[0] + n[1] + n[2]
-    }
-
-    #[inline(always)]
-    fn plane_bounds<V: Simd>(&self, simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
-        let zero = f64x8::splat(simd, 0.0);
-        let (whole, rest) = split_centred(n, v0);
-        let above = n[0].max(zero) + n[1].max(zero) + n[2].max(zero);
-        let below = n[0].min(zero) + n[1].min(zero) + n[2].min(zero);
-        (whole + rest.ceil() - above, whole + rest.floor() - below)
     }
 }
 
@@ -149,6 +204,18 @@ impl Rule for Thin {
     }
 }
 
+impl VectorRule for Thin {
+    #[inline(always)]
+    fn edges<V: Simd>(&self, _simd: V, na: f64x8<V>, nb: f64x8<V>, nv: f64x8<V>) -> f64x8<V> {
+        within_edges(self, na, nb, nv)
+    }
+
+    #[inline(always)]
+    fn planes<V: Simd>(&self, _simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+        within_planes(self, n, v0)
+    }
+}
+
 impl SurfaceRule for Thin {
     #[inline(always)]
     fn centre_reach<V: Simd, F: SimdFloat<V>>(&self, na: F, nb: F) -> F {
@@ -158,15 +225,6 @@ impl SurfaceRule for Thin {
     #[inline(always)]
     fn centre_plane_reach<V: Simd, F: SimdFloat<V>>(&self, n: [F; 3]) -> F {
         n[0].max(n[1]).max(n[2])
-    }
-
-    #[inline(always)]
-    fn plane_bounds<V: Simd>(&self, _simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
-        // Seen from the voxel's centre: v0 half a voxel lower, split into a whole voxel and the rest.
-        let half = f64::from(STEPS_PER_VOXEL / 2);
-        let (whole, rest) = split_centred(n, [v0[0] - half, v0[1] - half, v0[2] - half]);
-        let reach = n[0].abs().max(n[1].abs()).max(n[2].abs()) * 0.5;
-        (whole + (rest - reach).ceil(), whole + (rest + reach).floor())
     }
 }
 
@@ -196,6 +254,20 @@ impl Rule for Solid {
     fn plane<T: Int>(&self, n: [T; 3], v0: [i64; 3]) -> (T, T) {
         let (whole, rest) = split(n, v0, [-S / 2; 3]);
         let d1 = whole + ceil_voxels(rest);
+        (d1, d1)
+    }
+}
+
+impl VectorRule for Solid {
+    #[inline(always)]
+    fn edges<V: Simd>(&self, simd: V, na: f64x8<V>, nb: f64x8<V>, nv: f64x8<V>) -> f64x8<V> {
+        centre_edges(simd, na, nb, nv)
+    }
+
+    #[inline(always)]
+    fn planes<V: Simd>(&self, _simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+        let (whole, rest) = split_long(n, [v0[0] - HALF, v0[1] - HALF, v0[2] - HALF]);
+        let d1 = whole + rest.ceil();
         (d1, d1)
     }
 }
@@ -231,5 +303,21 @@ impl Rule for Sliced {
         let low = whole - overlap_whole + ceil_voxels(rest - overlap_rest) - n[2];
         let high = whole + overlap_whole + (rest + overlap_rest).floor_voxels();
         (low, high)
+    }
+}
+
+impl VectorRule for Sliced {
+    #[inline(always)]
+    fn edges<V: Simd>(&self, simd: V, na: f64x8<V>, nb: f64x8<V>, nv: f64x8<V>) -> f64x8<V> {
+        centre_edges(simd, na, nb, nv)
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_precision_loss, reason = "less than two voxels")]
+    fn planes<V: Simd>(&self, _simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+        let overlap = self.overlap as f64;
+        let (low, low_rest) = split_long(n, [v0[0] - HALF, v0[1] - HALF, v0[2] - overlap]);
+        let (high, high_rest) = split_long(n, [v0[0] - HALF, v0[1] - HALF, v0[2] + overlap]);
+        (low + low_rest.ceil() - n[2], high + high_rest.floor())
     }
 }

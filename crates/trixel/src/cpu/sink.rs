@@ -16,13 +16,13 @@ pub(super) trait Sink {
     /// The voxels `(x, y, from..=to)`, all inside the clip that the kernel was given.
     fn run(&mut self, x: i64, y: i64, from: i64, to: i64);
 
-    /// Runs of columns `(x, y)` of eight by eight from `at` on: those whose bit `8 x + y` is set in `columns`. The z of their
-    /// ends are seen from `at`, where a word of each column begins, and are at most `last_z`.
+    /// Runs of columns `(x, y)` of eight by eight from `at` on: those whose bit `8 x + y`, or if `turned` `8 y + x`, is set
+    /// in `columns`. The z of their ends are seen from `at`, where a word of each column begins, and are at most `last_z`.
     #[inline(always)]
-    fn tile(&mut self, at: [i64; 3], columns: u64, from: &Tile, to: &Tile, _last_z: i64) {
+    fn tile(&mut self, at: [i64; 3], turned: bool, columns: u64, from: &Tile, to: &Tile, _last_z: i64) {
         for_each_column(columns, |column| {
-            let (x, y) = (at[0] + (column / 8) as i64, at[1] + (column % 8) as i64);
-            self.run(x, y, at[2] + from[column], at[2] + to[column]);
+            let [x, y] = turn(turned, [(column / 8) as i64, (column % 8) as i64]);
+            self.run(at[0] + x, at[1] + y, at[2] + from[column], at[2] + to[column]);
         });
     }
 
@@ -270,12 +270,12 @@ impl Sink for SetRuns<'_> {
 
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
-    fn tile(&mut self, at: [i64; 3], columns: u64, from: &Tile, to: &Tile, last_z: i64) {
+    fn tile(&mut self, at: [i64; 3], turned: bool, columns: u64, from: &Tile, to: &Tile, last_z: i64) {
         let Slab { words, start, columns: row, column_words } = &mut self.0;
         let [x, y, z] = [0, 1, 2].map(|i| (at[i] - start[i]) as usize);
         let first = (x * *row + y) * *column_words + z / WORD_BITS as usize;
-        let layer = *row * *column_words;
-        let word = |column: usize| first + column / 8 * layer + column % 8 * *column_words;
+        let [step, beside] = turn(turned, [*row * *column_words, *column_words]);
+        let word = |column: usize| first + column / 8 * step + column % 8 * beside;
         if last_z < i64::from(WORD_BITS) {
             for_each_column(columns, |column| {
                 let (from, to) = (from[column] as u32 % WORD_BITS, to[column] as u32 % WORD_BITS);
@@ -293,11 +293,17 @@ impl Sink for SetRuns<'_> {
             });
         } else {
             for_each_column(columns, |column| {
-                let (x, y) = (at[0] + (column / 8) as i64, at[1] + (column % 8) as i64);
-                self.run(x, y, at[2] + from[column], at[2] + to[column]);
+                let [x, y] = turn(turned, [(column / 8) as i64, (column % 8) as i64]);
+                self.run(at[0] + x, at[1] + y, at[2] + from[column], at[2] + to[column]);
             });
         }
     }
+}
+
+/// What is along x and along y, or along y and x.
+#[inline(always)]
+pub(super) fn turn<T>(turned: bool, [a, b]: [T; 2]) -> [T; 2] {
+    if turned { [b, a] } else { [a, b] }
 }
 
 /// Calls `each` with the numbers of the bits set in `columns`.

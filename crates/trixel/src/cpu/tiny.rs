@@ -2,7 +2,7 @@
 //!
 //! First in f32 ([`filter`]). Where rounding may have decided a test, all are repeated in f64, in two halves of eight
 //! lanes. That is exact, as everything is integers below 2^53: corners are below 2^18 steps from the box's corner, edge
-//! functions below 2^38, normals below 2^36, and the plane's terms below 2^53 ([`SurfaceRule::plane_bounds`]).
+//! functions below 2^38, normals below 2^36, and the plane's terms below 2^53 ([`VectorRule::planes`](super::rule::VectorRule::planes)).
 
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, i64x8, mask32x16, prelude::*};
 
@@ -346,7 +346,7 @@ fn exact<V: Simd, R: SurfaceRule, const SIDE: usize>(simd: V, rule: &R, v: &[[f6
     let mut voxels = i64x8::splat(simd, 0);
 
     // The plane: d1 <= N . p <= d2.
-    let (d1, d2) = rule.plane_bounds(simd, n, v[0]);
+    let (d1, d2) = rule.planes(simd, n, v[0]);
     let mut at_x = zero;
     for x in 0..SIDE {
         let mut at_y = at_x;
