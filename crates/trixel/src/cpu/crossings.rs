@@ -33,7 +33,7 @@ const DISTANCES: [i32; 4] = [0, 1, 2, 3];
 
 /// Sends the runs, from the lowest voxel whose centre is not below the triangle to the top of the clip, of the waiting
 /// triangles, with centres of at most `SIDE` columns along x and y: of as many as fill vectors, or of all.
-#[inline(always)]
+#[inline(never)]
 pub(super) fn flush<V: Simd, const SIDE: usize>(
     simd: V,
     waiting: &mut Queue,
@@ -42,17 +42,12 @@ pub(super) fn flush<V: Simd, const SIDE: usize>(
     clip: &VoxelBox,
     sink: &mut impl Sink,
 ) {
-    let mut first = 0;
-    loop {
-        let count = waiting.lanes(first, all);
-        if count == 0 {
-            break;
-        }
-        let corners = waiting.vectors(simd, first);
-        cross_columns::<_, SIDE>(simd, &corners, count, near, clip, sink);
-        first += LANES;
-    }
-    waiting.keep(simd, first);
+    waiting.for_each(
+        simd,
+        all,
+        #[inline(always)]
+        |corners, count| cross_columns::<_, SIDE>(simd, corners, count, near, clip, sink),
+    );
 }
 
 /// [`flush`] of the first `count` lanes.

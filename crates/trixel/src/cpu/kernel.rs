@@ -128,10 +128,7 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
                         || tiny::send_octants(simd, &corners, two, &near, sink),
                     );
                 } else if two != 0 && waiting.twos.push(simd, &corners, two) {
-                    simd.vectorize(
-                        #[inline(always)]
-                        || tiny::flush_octants(simd, &mut waiting.twos, false, &near, sink),
-                    );
+                    tiny::flush_octants(simd, &mut waiting.twos, false, &near, sink);
                 }
             } else if two.count_ones() >= WORTH_CUBES {
                 simd.vectorize(
@@ -139,10 +136,7 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
                     || tiny::send_cubes::<_, _, 2>(simd, rule, &corners, two, &near, sink),
                 );
             } else if two != 0 && waiting.twos.push(simd, &corners, two) {
-                simd.vectorize(
-                    #[inline(always)]
-                    || tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, false, &near, sink),
-                );
+                tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, false, &near, sink);
             }
             tiny &= !two;
             if tiny != 0 {
@@ -151,28 +145,16 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
                 let shortest = extent[0].min(extent[1]).min(extent[2]);
                 let flat = shortest.simd_le(0).to_bitmask();
                 if three & flat != 0 && waiting.flat_threes.push(simd, &corners, three & flat) {
-                    simd.vectorize(
-                        #[inline(always)]
-                        || tiny::flush_flats::<_, _, 3>(simd, rule, &mut waiting.flat_threes, false, &near, sink),
-                    );
+                    tiny::flush_flats::<_, _, 3>(simd, rule, &mut waiting.flat_threes, false, &near, sink);
                 }
                 if four & flat != 0 && waiting.flat_fours.push(simd, &corners, four & flat) {
-                    simd.vectorize(
-                        #[inline(always)]
-                        || tiny::flush_flats::<_, _, 4>(simd, rule, &mut waiting.flat_fours, false, &near, sink),
-                    );
+                    tiny::flush_flats::<_, _, 4>(simd, rule, &mut waiting.flat_fours, false, &near, sink);
                 }
                 if three & !flat != 0 && waiting.threes.push(simd, &corners, three & !flat) {
-                    simd.vectorize(
-                        #[inline(always)]
-                        || tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, false, &near, sink),
-                    );
+                    tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, false, &near, sink);
                 }
                 if four & !flat != 0 && waiting.fours.push(simd, &corners, four & !flat) {
-                    simd.vectorize(
-                        #[inline(always)]
-                        || tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, false, &near, sink),
-                    );
+                    tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, false, &near, sink);
                 }
             }
             let not_tiny = meets & !settled & !two & !tiny;
@@ -277,10 +259,7 @@ impl Others {
         let short = extent[0].max(extent[1]).max(extent[2]).simd_le(SMALL_EXTENT as i32).to_bitmask();
         let small = if rule.fits_small() { short & lanes } else { 0 };
         if small != 0 && self.rows.push(simd, corners, small) {
-            simd.vectorize(
-                #[inline(always)]
-                || self.rows.send(simd, rule, false, near, sink),
-            );
+            self.rows.send(simd, rule, false, near, sink);
         }
         for lane in set_bits(lanes & !small) {
             large::voxelize(simd.level(), rule, &triangles.corners(at + lane), clip, sink, &mut self.large);
@@ -289,11 +268,10 @@ impl Others {
 
     /// Sends what waits.
     #[inline(always)]
-    fn finish<V: Simd, R: VectorRule>(&mut self, simd: V, rule: &R, near: &NearClip<V>, sink: &mut impl Sink) {
-        simd.vectorize(
-            #[inline(always)]
-            || self.rows.send(simd, rule, true, near, sink),
-        );
+    fn finish<V: Simd, R: VectorRule, S: Sink>(&mut self, simd: V, rule: &R, near: &NearClip<V>, sink: &mut S) {
+        if !S::LEAVES {
+            self.rows.send(simd, rule, true, near, sink);
+        }
     }
 }
 
@@ -461,16 +439,10 @@ pub(super) fn solid<'a, V: Simd, S: Sink>(
             let tiny = some & longest.simd_le(3).to_bitmask();
             let (two, four) = (tiny & few, tiny & !few);
             if two != 0 && twos.push(simd, &corners, two) {
-                simd.vectorize(
-                    #[inline(always)]
-                    || crossings::flush::<_, 2>(simd, &mut twos, false, &near, clip, sink),
-                );
+                crossings::flush::<_, 2>(simd, &mut twos, false, &near, clip, sink);
             }
             if four != 0 && fours.push(simd, &corners, four) {
-                simd.vectorize(
-                    #[inline(always)]
-                    || crossings::flush::<_, 4>(simd, &mut fours, false, &near, clip, sink),
-                );
+                crossings::flush::<_, 4>(simd, &mut fours, false, &near, clip, sink);
             }
             if S::LEAVES {
                 leave(triangles, at, some & !tiny, &low, &high, &near, sink);

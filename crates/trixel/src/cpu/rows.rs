@@ -51,7 +51,7 @@ impl Rows {
     }
 
     /// Sends the runs of the waiting triangles inside the clip: of as many as fill vectors, or of all.
-    #[inline(always)]
+    #[inline(never)]
     pub(super) fn send<V: Simd, R: VectorRule>(
         &mut self,
         simd: V,
@@ -61,25 +61,23 @@ impl Rows {
         sink: &mut impl Sink,
     ) {
         let Self { waiting, tests, scratch } = self;
-        let mut first = 0;
-        loop {
-            let count = waiting.lanes(first, all);
-            if count == 0 {
-                break;
-            }
-            let (boxes, halves) = Boxes::new::<_, R>(simd, &waiting.vectors(simd, first), clip);
-            for (half, corners) in halves.iter().enumerate() {
-                let lanes = LANES * half..count.min(LANES * (half + 1));
-                if !lanes.is_empty() {
-                    tests.find(simd, rule, corners);
+        waiting.for_each(
+            simd,
+            all,
+            #[inline(always)]
+            |corners, count| {
+                let (boxes, halves) = Boxes::new::<_, R>(simd, corners, clip);
+                for (half, corners) in halves.iter().enumerate() {
+                    let lanes = LANES * half..count.min(LANES * (half + 1));
+                    if !lanes.is_empty() {
+                        tests.find(simd, rule, corners);
+                    }
+                    for lane in lanes {
+                        send::<_, R>(simd, tests, &boxes, lane, sink, scratch);
+                    }
                 }
-                for lane in lanes {
-                    send::<_, R>(simd, tests, &boxes, lane, sink, scratch);
-                }
-            }
-            first += triangles::LANES;
-        }
-        waiting.keep(simd, first);
+            },
+        );
     }
 }
 

@@ -95,7 +95,7 @@ pub(super) fn send_boxes<V: Simd>(
 
 /// Sends the voxels of the waiting triangles, whose boxes have at most `SIDE` voxels along each axis: of as many as fill
 /// vectors, or of all.
-#[inline(always)]
+#[inline(never)]
 pub(super) fn flush<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
     rule: &R,
@@ -104,16 +104,12 @@ pub(super) fn flush<V: Simd, R: SurfaceRule, const SIDE: usize>(
     clip: &NearClip<V>,
     sink: &mut impl CubeSink,
 ) {
-    let mut first = 0;
-    loop {
-        let count = waiting.lanes(first, all);
-        if count == 0 {
-            break;
-        }
-        send_cubes::<_, _, SIDE>(simd, rule, &waiting.vectors(simd, first), used(count), clip, sink);
-        first += LANES;
-    }
-    waiting.keep(simd, first);
+    waiting.for_each(
+        simd,
+        all,
+        #[inline(always)]
+        |corners, count| send_cubes::<_, _, SIDE>(simd, rule, corners, used(count), clip, sink),
+    );
 }
 
 /// [`flush`] of the triangles in `lanes`.
@@ -158,7 +154,7 @@ pub(super) fn send_octants<V: Simd>(
 }
 
 /// [`send_octants`] of the waiting triangles: of as many as fill vectors, or of all.
-#[inline(always)]
+#[inline(never)]
 pub(super) fn flush_octants<V: Simd>(
     simd: V,
     waiting: &mut Queue,
@@ -166,21 +162,17 @@ pub(super) fn flush_octants<V: Simd>(
     clip: &NearClip<V>,
     sink: &mut impl CubeSink,
 ) {
-    let mut first = 0;
-    loop {
-        let count = waiting.lanes(first, all);
-        if count == 0 {
-            break;
-        }
-        send_octants(simd, &waiting.vectors(simd, first), used(count), clip, sink);
-        first += LANES;
-    }
-    waiting.keep(simd, first);
+    waiting.for_each(
+        simd,
+        all,
+        #[inline(always)]
+        |corners, count| send_octants(simd, corners, used(count), clip, sink),
+    );
 }
 
 /// [`flush`] for boxes of one voxel along some axis. Where touching is enough, triangles strictly inside their layer meet a
 /// voxel where their projections meet.
-#[inline(always)]
+#[inline(never)]
 pub(super) fn flush_flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
     rule: &R,
@@ -189,38 +181,32 @@ pub(super) fn flush_flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     clip: &NearClip<V>,
     sink: &mut impl CubeSink,
 ) {
-    let mut first = 0;
-    loop {
-        let count = waiting.lanes(first, all);
-        if count == 0 {
-            break;
-        }
-        flats::<_, _, SIDE>(simd, rule, waiting, first, count, clip, sink);
-        first += LANES;
-    }
-    waiting.keep(simd, first);
+    waiting.for_each(
+        simd,
+        all,
+        #[inline(always)]
+        |corners, count| flats::<_, _, SIDE>(simd, rule, corners, used(count), clip, sink),
+    );
 }
 
-/// [`flush_flats`] of `count` of the lanes from `first` on.
+/// [`flush_flats`] of the triangles in `lanes`.
 #[inline(always)]
 fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
     rule: &R,
-    waiting: &Queue,
-    first: usize,
-    count: usize,
+    corners: &Vectors<V>,
+    lanes: Lanes,
     clip: &NearClip<V>,
     sink: &mut impl CubeSink,
 ) {
-    let corners = waiting.vectors(simd, first);
-    let boxes = Boxes::new(simd, &corners);
+    let boxes = Boxes::new(simd, corners);
     let places = sink.places(&boxes.low, clip.base);
-    let Filtered { mut voxels, doubtful } = in_layers::<_, _, SIDE>(simd, rule, &corners, &boxes);
-    if doubtful & used(count) != 0 {
+    let Filtered { mut voxels, doubtful } = in_layers::<_, _, SIDE>(simd, rule, corners, &boxes);
+    if doubtful & lanes != 0 {
         voxels = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
     }
     boxes.keep::<SIDE>(simd, clip, &mut voxels);
-    sink.cubes::<_, SIDE>(&places, &voxels, used(count));
+    sink.cubes::<_, SIDE>(&places, &voxels, lanes);
 }
 
 /// The voxels of cubes of `SIDE` that triangles meet whose boxes are one layer: of those inside the boxes. A row of voxels is

@@ -286,7 +286,7 @@ pub(super) struct Queue {
 impl Queue {
     pub(super) const EMPTY: Self = Self { corners: Corners::NONE, count: 0 };
 
-    /// Adds the triangles of the lanes in `mask`; `true` when [`Self::take`] must follow before the next ones.
+    /// Adds the triangles of the lanes in `mask`; `true` when [`Self::for_each`] must follow before the next ones.
     #[inline(always)]
     pub(super) fn push<V: Simd>(&mut self, simd: V, from: &Vectors<V>, mask: u64) -> bool {
         let lanes = fearless_simd::mask32x16::from_bitmask(simd, mask);
@@ -300,23 +300,37 @@ impl Queue {
         self.count > WAITING - LANES
     }
 
-    /// The lanes in use of the vector of triangles that wait from `first` on: all, or as many as are left if they are to be
-    /// done too, or none.
+    /// Calls `each` with vectors of the triangles that wait and how many of the lanes are used: with as many as fill vectors,
+    /// which then wait no longer, or with all. Whoever does that with much code does it out of line, so that it is compiled
+    /// once for the calls before and after the last triangle.
     #[inline(always)]
-    pub(super) fn lanes(&self, first: usize, all: bool) -> usize {
-        let lanes = self.count.saturating_sub(first).min(LANES);
-        if lanes == LANES || all { lanes } else { 0 }
+    pub(super) fn for_each<V: Simd>(&mut self, simd: V, all: bool, mut each: impl FnMut(&Vectors<V>, usize)) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut first = 0;
+                loop {
+                    let lanes = self.count.saturating_sub(first).min(LANES);
+                    if lanes == 0 || lanes < LANES && !all {
+                        break;
+                    }
+                    each(&self.vectors(simd, first), lanes);
+                    first += LANES;
+                }
+                self.keep(simd, first);
+            },
+        );
     }
 
-    /// The triangles that wait from `first` on; beyond [`Self::lanes`], anything.
+    /// The triangles that wait from `first` on; beyond the last, anything.
     #[inline(always)]
-    pub(super) fn vectors<V: Simd>(&self, simd: V, first: usize) -> Vectors<V> {
+    fn vectors<V: Simd>(&self, simd: V, first: usize) -> Vectors<V> {
         self.corners.vectors(simd, first.min(WAITING - LANES))
     }
 
     /// Keeps the triangles, fewer than a vector's, from `first` on.
     #[inline(always)]
-    pub(super) fn keep<V: Simd>(&mut self, simd: V, first: usize) {
+    fn keep<V: Simd>(&mut self, simd: V, first: usize) {
         let kept = self.vectors(simd, first);
         for k in 0..3 {
             for i in 0..3 {
