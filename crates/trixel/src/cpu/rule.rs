@@ -321,3 +321,67 @@ impl VectorRule for Sliced {
         (low + low_rest.ceil() - n[2], high + high_rest.floor())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conformance::random::Random;
+
+    const LANES: usize = 8;
+    const ROUNDS: usize = 2000;
+
+    /// Corners of the largest small triangles, mostly within a step of whole and half voxels or of their limits.
+    fn corner(random: &mut Random) -> [i64; 3] {
+        [0; 3].map(|_: i64| match random.range(0, 3) {
+            0 => random.range(0, 64 * S),
+            1 => (random.range(0, 128) * S / 2 + random.range(-1, 1)).clamp(0, 64 * S),
+            2 => random.range(0, 1) * 64 * S,
+            _ => random.range(0, 2 * S),
+        })
+    }
+
+    /// One number of each triangle.
+    fn vector<V: Simd>(simd: V, number: impl Fn(usize) -> i64) -> f64x8<V> {
+        #[expect(clippy::cast_precision_loss, reason = "below 2^53")]
+        let numbers: [f64; LANES] = std::array::from_fn(|lane| number(lane) as f64);
+        f64x8::from_slice(simd, &numbers)
+    }
+
+    /// In vectors, thresholds are what they are one by one.
+    fn vectors_agree<V: Simd, R: VectorRule>(simd: V, rule: &R) {
+        let mut random = Random::new(10);
+        for round in 0..ROUNDS {
+            let v: [[[i64; 3]; 3]; LANES] = std::array::from_fn(|_| std::array::from_fn(|_| corner(&mut random)));
+            let edge = |lane: usize, i: usize, k: usize| v[lane][(k + 1) % 3][i] - v[lane][k][i];
+            let cross = |lane: usize, i: usize| {
+                let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+                edge(lane, a, 0) * edge(lane, b, 1) - edge(lane, b, 0) * edge(lane, a, 1)
+            };
+            let up = |lane: usize, i: usize| if cross(lane, 2) < 0 { -cross(lane, i) } else { cross(lane, i) };
+            for (k, a, b) in (0..9).map(|i| (i / 3, i % 3, (i + 1) % 3)) {
+                let (na, nb) = (|lane| -edge(lane, b, k), |lane| edge(lane, a, k));
+                let nv = |lane: usize| na(lane) * v[lane][k][a] + nb(lane) * v[lane][k][b];
+                let edges = rule.edges(simd, vector(simd, na), vector(simd, nb), vector(simd, nv));
+                let one_by_one = vector(simd, |lane| rule.edge(na(lane), nb(lane), nv(lane)));
+                assert_eq!(*edges, *one_by_one, "round {round}, {v:?}");
+            }
+            let n = [0, 1, 2].map(|i| vector(simd, |lane| up(lane, i)));
+            let (d1, d2) = rule.planes(simd, n, [0, 1, 2].map(|i| vector(simd, |lane| v[lane][0][i])));
+            let plane = |lane: usize| rule.plane([0, 1, 2].map(|i| up(lane, i)), v[lane][0]);
+            assert_eq!(*d1, *vector(simd, |lane| plane(lane).0), "round {round}, {v:?}");
+            assert_eq!(*d2, *vector(simd, |lane| plane(lane).1), "round {round}, {v:?}");
+        }
+    }
+
+    #[test]
+    fn thresholds_of_vectors_are_those_of_integers() {
+        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => {
+            vectors_agree(simd, &Conservative);
+            vectors_agree(simd, &Thin);
+            vectors_agree(simd, &Solid);
+            for overlap in [0, 1, S / 2, S, 2 * S - 1] {
+                vectors_agree(simd, &Sliced { overlap });
+            }
+        });
+    }
+}
