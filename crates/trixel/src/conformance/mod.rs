@@ -19,7 +19,7 @@ macro_rules! conformance_suite {
         $crate::conformance_suite!(@tests $name, $backend,
             zoo_conservative zoo_thin zoo_solid zoo_sliced
             random_small random_on_lattice random_degenerate random_large random_huge random_far_outside
-            random_in_cells
+            random_in_cells random_in_cells_beside_far
             sliced_overlap solid_closed_soup huge_dims
             grid_is_overwritten other_grid_is_refused
             rival_cuda_voxelizer_64_aligned_cube rival_fluidx3d_323_lattice_terrain rival_open3d_6111_interior

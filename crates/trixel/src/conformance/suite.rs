@@ -161,6 +161,16 @@ pub fn random_huge(backend: &dyn Backend) {
 /// Thousands of triangles, each alone in a cell of one grid, so that none hides behind another; the outermost cells are
 /// cut by the grid's border.
 pub fn random_in_cells(backend: &dyn Backend) {
+    in_cells(backend, &[]);
+}
+
+/// The same in a mesh whose other corners are so far away that lattice coordinates need more than 32 bits.
+pub fn random_in_cells_beside_far(backend: &dyn Backend) {
+    const FAR: i64 = 1_000_000 << 16;
+    in_cells(backend, &[[[FAR, FAR, 0], [FAR, FAR, FAR], [2 * FAR, FAR, FAR]]]);
+}
+
+fn in_cells(backend: &dyn Backend, others: &[[[i64; 3]; 3]]) {
     let mut random = Random::new(7);
     for (extent, along) in [(1, 12), (2, 12), (4, 10), (9, 8), (70, 2), (150, 1)] {
         for placement in Placement::ALL {
@@ -172,6 +182,7 @@ pub fn random_in_cells(backend: &dyn Backend) {
                     let corners = random::triangle(&mut random, placement, 0, 1, extent);
                     corners.map(|corner| std::array::from_fn(|axis| corner[axis] + at[axis]))
                 })
+                .chain(others.iter().copied())
                 .collect();
             let side = u32::try_from((along - 1) * pitch + extent / 2).unwrap_or(1);
             let cells = grid([1.0; 3], [1.0; 3], [side, side + 3, side - 1]);

@@ -159,7 +159,7 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
             }
             let not_tiny = meets & !settled & !two & !tiny;
             if S::LEAVES {
-                leave(triangles, at, not_tiny, &low, &high, &near, sink);
+                leave(triangles, at, not_tiny, [[low[0], high[0]], [low[1], high[1]]], &near, sink);
             } else if not_tiny != 0 {
                 others.send(simd, rule, triangles, at, &corners, not_tiny, clip, &near, sink);
             }
@@ -177,20 +177,19 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
     others.finish(simd, rule, &near, sink);
 }
 
-/// Leaves the triangles in `lanes` of the vector that starts with the `at`th.
+/// Leaves the triangles in `lanes` of the vector that starts with the `at`th, with the columns that they have along
+/// x and y.
 #[inline(always)]
 fn leave<V: Simd>(
     triangles: &Selected<'_>,
     at: usize,
     lanes: Lanes,
-    low: &[i32x16<V>; 3],
-    high: &[i32x16<V>; 3],
+    [[x, x_last], [y, _]]: [[i32x16<V>; 2]; 2],
     near: &NearClip<V>,
     sink: &mut impl Sink,
 ) {
     if lanes != 0 {
-        let from = [*low[0].max(near.low[0]), *low[1].max(near.low[1])];
-        let to = *high[0].min(near.high[0]);
+        let (from, to) = ([*x.max(near.low[0]), *y.max(near.low[1])], *x_last.min(near.high[0]));
         for lane in set_bits(lanes) {
             let along = |i: usize, of: &[i32; LANES]| near.base[i] + i64::from(of[lane % LANES]);
             sink.leave(triangles.number(at + lane), [along(0, &from[0]), along(0, &to)], along(1, &from[1]));
@@ -445,7 +444,7 @@ pub(super) fn solid<'a, V: Simd, S: Sink>(
                 crossings::flush::<_, 4>(simd, &mut fours, false, &near, clip, sink);
             }
             if S::LEAVES {
-                leave(triangles, at, some & !tiny, &low, &high, &near, sink);
+                leave(triangles, at, some & !tiny, columns, &near, sink);
             } else if some & !tiny != 0 {
                 others.send(simd, rule, triangles, at, &corners, some & !tiny, clip, &near, sink);
             }
@@ -476,13 +475,13 @@ pub(super) fn centres<'a, V: Simd, R: VectorRule, S: Sink>(
         sink,
         #[inline(always)]
         |sink, triangles, at, corners, lanes| {
+            let columns = crossings::columns(&corners, &near);
             let mut some = lanes;
-            for [low, high] in crossings::columns(&corners, &near) {
+            for [low, high] in columns {
                 some &= low.simd_le(high).to_bitmask();
             }
             if S::LEAVES {
-                let [low, high] = corners.boxes();
-                leave(triangles, at, some, &low, &high, &near, sink);
+                leave(triangles, at, some, columns, &near, sink);
             } else if some != 0 {
                 others.send(simd, rule, triangles, at, &corners, some, clip, &near, sink);
             }

@@ -5,7 +5,7 @@
 //! - `octants`: the tests of `tiny` for the smallest
 //! - `filter`: its tests for all others in f32, and where they need to be repeated exactly
 //! - `instructions`: the vector instructions they are compiled for
-//! - `setup`: what paths compute first
+//! - `setup`: what `large` and `fragments` compute first
 //! - `rule`: the modes as thresholds
 //! - `fragments`: the voxels of each triangle by itself, for attributes
 //! - `number`: exact integers and floor lines

@@ -4,7 +4,8 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use crate::lattice::STEP_BITS;
 
-/// An integer wide enough for the triangles it is used on: `i64` up to [`SMALL_EXTENT`] voxels, `i128` above.
+/// An integer wide enough for the triangles it is used on: `i64` up to [`SMALL_EXTENT`] voxels or, where only runs are
+/// followed, [`MEDIUM_EXTENT`], `i128` above.
 pub(crate) trait Int:
     Copy + Ord + From<i64> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {

@@ -1,8 +1,12 @@
 //! Triangles of a few voxels: row by row, eight columns of a row at a time, one a vector lane.
 //!
 //! What a triangle's tests need is found for eight triangles at a time ([`Tests`]). Then, for each x, the columns (x, y)
-//! that the xy projection allows get the run that the plane and the other two projections leave. All numbers are integers
-//! below 2^53 in f64; the quotients are floored exactly (see [`SMALL_EXTENT`]).
+//! that the xy projection allows get the run that the plane and the other two projections leave; for each y, where the
+//! triangle is longer along x, so that x and y in this file are the grid's y and x.
+//!
+//! All of it is exact in f64, which holds 53 bits. Corners are within 2^22 steps, normals thus below 2^44 and `n.v` of edges below
+//! 2^45; the plane's terms are split so that they are whole numbers below 2^52, and fractions of 2^-16 below 2^18. The
+//! quotients are floored exactly (see [`SMALL_EXTENT`]).
 //!
 //! [`SMALL_EXTENT`]: super::number::SMALL_EXTENT
 
@@ -20,7 +24,7 @@ use crate::volume::WORD_BITS;
 /// Columns judged at once, and triangles whose tests are found at once.
 const LANES: usize = 8;
 
-/// A number for each column `(x, y)` of eight by eight, at `8 x + y`.
+/// A number for each column `(x, y)` of eight by eight, at `8 x + y`, or `8 y + x` where x and y are exchanged.
 pub(super) type Tile = [i64; LANES * LANES];
 
 /// Columns along an axis of the largest box, rounded up to whole vectors.

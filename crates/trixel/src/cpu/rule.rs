@@ -27,7 +27,7 @@ pub(super) trait Rule: Copy + Send + Sync {
     /// Whether a run goes on to the top of the clip whatever the plane's upper bound.
     const TO_TOP: bool = false;
 
-    /// Whether 64-bit arithmetic is exact for small triangles.
+    /// Whether arithmetic in 64 bits, and in the 53 of f64, is exact for small triangles.
     #[inline(always)]
     fn fits_small(&self) -> bool {
         true
@@ -45,7 +45,7 @@ pub(super) trait VectorRule: Rule {
     /// [`Rule::edge`].
     fn edges<V: Simd>(&self, simd: V, na: f64x8<V>, nb: f64x8<V>, nv: f64x8<V>) -> f64x8<V>;
 
-    /// [`Rule::plane`], with a normal turned either way.
+    /// [`Rule::plane`]; on surfaces the normal may point down.
     fn planes<V: Simd>(&self, simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>);
 }
 
@@ -73,8 +73,8 @@ pub(super) fn split_centred<V: Simd>(n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f6
     (whole, rest * (1.0 / steps))
 }
 
-/// [`split_centred`] for |N_i| below 2^44 and |v0| below 2^23: the normal is split into multiples of S, whose products with
-/// r are whole, and the rest.
+/// N.v0 / S as the sum of a whole number and of fractions, for |N_i| below 2^44 and |v0| below 2^22 and two voxels. With `v0 =
+/// S p + r` and `N = S m + l`, N.p and m.r are whole, N.p below 3 * 2^44 * 67 < 2^52, and l.r is below 3 * 2^31.
 #[inline(always)]
 fn split_long<V: Simd>(n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
     let steps = f64::from(STEPS_PER_VOXEL);

@@ -1,4 +1,4 @@
-//! What every path of the kernel computes first: local coordinates, edges, normal, and edge constraints.
+//! What is computed first of one triangle by itself: local coordinates, edges, normal, and edge constraints.
 
 use super::number::Int;
 use super::rule::Rule;
@@ -26,7 +26,7 @@ pub(super) struct Constraint<T> {
 impl<T: Int> Setup<T> {
     #[inline(always)]
     pub(super) fn new(triangle: &[[i64; 3]; 3], base: [i64; 3]) -> Self {
-        // Spelled out: the closures of `map` and `from_fn` are not always inlined, and this is the hottest code there is.
+        // Spelled out: the closures of `map` and `from_fn` are not always inlined, and calls cost more than what they do.
         let local = |p: [i64; 3]| {
             let steps = i64::from(STEPS_PER_VOXEL);
             [p[0] - base[0] * steps, p[1] - base[1] * steps, p[2] - base[2] * steps]

@@ -2,7 +2,8 @@
 //!
 //! First in f32 ([`filter`]). Where rounding may have decided a test, all are repeated in f64, in two halves of eight
 //! lanes. That is exact, as everything is integers below 2^53: corners are below 2^18 steps from the box's corner, edge
-//! functions below 2^38, normals below 2^36, and the plane's terms below 2^53 ([`VectorRule::planes`](super::rule::VectorRule::planes)).
+//! functions below 2^38, normals below 2^36, and the plane's terms smaller than those of larger triangles, which fit too
+//! ([`rows`](super::rows)).
 
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, i64x8, mask32x16, prelude::*};
 

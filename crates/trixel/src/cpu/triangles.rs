@@ -84,7 +84,8 @@ impl<'a> Selected<'a> {
                 block.fill(&numbers[start..end], |&i| all[i as usize], |vertex| positions[vertex as usize]);
             }
             (LatticePositions::Wide(positions), which) => {
-                // Beyond 32 bits, a corner is outside the clip by far; its triangle is not judged by these numbers.
+                // Beyond 32 bits, a corner is outside the clip by far, here as there: its triangle is larger than what
+                // is judged by these numbers, or does not come near the clip.
                 #[expect(clippy::cast_possible_truncation, reason = "clamped")]
                 let near = |at: i64, base: i64| {
                     (at - (base << STEP_BITS)).clamp(-i64::from(i32::MAX), i64::from(i32::MAX)) as i32
