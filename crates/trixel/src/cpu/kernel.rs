@@ -37,9 +37,9 @@ impl VoxelBox {
         Self { low: [low(0), low(1), low(2)], high: [high(0), high(1), high(2)] }
     }
 
-    /// The columns whose centres are inside the triangle's closed bounding box, between the bottom and the top of `clip`.
+    /// The columns whose centres are inside the triangle's closed bounding box, from the bottom to the top of `clip`.
     #[inline(always)]
-    pub(super) fn below_and_above([a, b, c]: &[[i64; 3]; 3], clip: &Self) -> Self {
+    pub(super) fn columns([a, b, c]: &[[i64; 3]; 3], clip: &Self) -> Self {
         const HALF: i64 = (STEPS_PER_VOXEL / 2) as i64;
         let low = |i: usize| (a[i].min(b[i]).min(c[i]) + HALF - 1) >> STEP_BITS;
         let high = |i: usize| (a[i].max(b[i]).max(c[i]) - HALF) >> STEP_BITS;
@@ -157,11 +157,13 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
                     tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, false, &near, sink);
                 }
             }
-            let not_tiny = meets & !settled & !two & !tiny;
+            let left = meets & !settled & !two & !tiny;
             if S::LEAVES {
-                leave(triangles, at, not_tiny, [[low[0], high[0]], [low[1], high[1]]], &near, sink);
-            } else if not_tiny != 0 {
-                others.send(simd, rule, triangles, at, &corners, not_tiny, clip, &near, sink);
+                leave(triangles, at, left, [[low[0], high[0]], [low[1], high[1]]], &near, sink);
+            } else if left != 0 {
+                // A copy, so that corners need not be in memory anywhere else.
+                let stored = corners;
+                others.send(simd, rule, triangles, at, &stored, left, clip, &near, sink);
             }
         },
     );
@@ -197,16 +199,16 @@ fn leave<V: Simd>(
     }
 }
 
-/// [`surface`] for triangles that are not tiny.
-#[cfg(feature = "threads")]
+/// Sends the voxels of any mode inside `clip`, or the toggles of mode solid, to `sink`, until it is full or there are no more
+/// pieces: as if no triangle were tiny.
 #[inline(always)]
-pub(super) fn surface_not_tiny<'a, V: Simd, R: SurfaceRule>(
+pub(super) fn not_tiny<'a, V: Simd, R: VectorRule, S: Sink>(
     simd: V,
     rule: &R,
     mesh: &LatticeMesh<'_>,
     pieces: impl Iterator<Item = Selected<'a>>,
     clip: &VoxelBox,
-    sink: &mut impl Sink,
+    sink: &mut S,
 ) {
     let mut others = Others::default();
     let base = base(mesh, clip);
@@ -217,11 +219,21 @@ pub(super) fn surface_not_tiny<'a, V: Simd, R: SurfaceRule>(
         base,
         sink,
         #[inline(always)]
-        |sink, triangles, at, corners, lanes| {
+        |sink, triangles, at, corners, mut lanes| {
             let [low, high] = corners.boxes();
-            let meets = near.meets(&low, &high) & lanes;
-            if meets != 0 {
-                others.send(simd, rule, triangles, at, &corners, meets, clip, &near, sink);
+            let mut columns = [[low[0], high[0]], [low[1], high[1]]];
+            if R::SURFACE {
+                lanes &= near.meets(&low, &high);
+            } else {
+                columns = crossings::columns(&corners, &near);
+                for [first, last] in columns {
+                    lanes &= first.simd_le(last).to_bitmask();
+                }
+            }
+            if S::LEAVES {
+                leave(triangles, at, lanes, columns, &near, sink);
+            } else if lanes != 0 {
+                others.send(simd, rule, triangles, at, &corners, lanes, clip, &near, sink);
             }
         },
     );
@@ -230,7 +242,9 @@ pub(super) fn surface_not_tiny<'a, V: Simd, R: SurfaceRule>(
 
 impl Others {
     /// Sends the voxels of the triangles in `lanes` of the vector that starts with the `at`th, some perhaps later.
-    #[inline(always)]
+    ///
+    /// Out of line: its code would slow down tiny triangles' paths.
+    #[inline(never)]
     #[expect(clippy::too_many_arguments, reason = "a step of the kernel")]
     fn send<V: Simd, R: VectorRule>(
         &mut self,
@@ -244,25 +258,30 @@ impl Others {
         near: &NearClip<V>,
         sink: &mut impl Sink,
     ) {
-        let [low, high] = corners.boxes();
-        let extent = [high[0] - low[0], high[1] - low[1], high[2] - low[2]];
-        if R::TOUCH_IS_ENOUGH {
-            // Strictly inside a row of voxels.
-            let row = (extent[0].min(1) + extent[1].min(1) + extent[2].min(1)).simd_le(1).to_bitmask() & lanes;
-            if row != 0 {
-                send_rows(row, &low, &high, near, sink);
-                lanes &= !row;
-            }
-        }
-        #[expect(clippy::cast_possible_truncation, reason = "63")]
-        let short = extent[0].max(extent[1]).max(extent[2]).simd_le(SMALL_EXTENT as i32).to_bitmask();
-        let small = if rule.fits_small() { short & lanes } else { 0 };
-        if small != 0 && self.rows.push(simd, corners, small) {
-            self.rows.send(simd, rule, false, near, sink);
-        }
-        for lane in set_bits(lanes & !small) {
-            large::voxelize(simd.level(), rule, &triangles.corners(at + lane), clip, sink, &mut self.large);
-        }
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let [low, high] = corners.boxes();
+                let extent = [high[0] - low[0], high[1] - low[1], high[2] - low[2]];
+                if R::TOUCH_IS_ENOUGH {
+                    // Strictly inside a row of voxels.
+                    let row = (extent[0].min(1) + extent[1].min(1) + extent[2].min(1)).simd_le(1).to_bitmask() & lanes;
+                    if row != 0 {
+                        send_whole(row, &low, &high, near, sink);
+                        lanes &= !row;
+                    }
+                }
+                #[expect(clippy::cast_possible_truncation, reason = "63")]
+                let short = extent[0].max(extent[1]).max(extent[2]).simd_le(SMALL_EXTENT as i32).to_bitmask();
+                let small = if rule.fits_small() { short & lanes } else { 0 };
+                if small != 0 && self.rows.push(simd, corners, small) {
+                    self.rows.send(simd, rule, false, near, sink);
+                }
+                for lane in set_bits(lanes & !small) {
+                    large::voxelize(simd.level(), rule, &triangles.corners(at + lane), clip, sink, &mut self.large);
+                }
+            },
+        );
     }
 
     /// Sends what waits.
@@ -276,7 +295,7 @@ impl Others {
 
 /// Sends all voxels inside the clip of the boxes of the lanes in `mask`.
 #[inline(always)]
-fn send_rows<V: Simd>(
+fn send_whole<V: Simd>(
     mask: Lanes,
     low: &[i32x16<V>; 3],
     high: &[i32x16<V>; 3],
@@ -452,40 +471,5 @@ pub(super) fn solid<'a, V: Simd, S: Sink>(
     );
     crossings::flush::<_, 2>(simd, &mut twos, true, &near, clip, sink);
     crossings::flush::<_, 4>(simd, &mut fours, true, &near, clip, sink);
-    others.finish(simd, rule, &near, sink);
-}
-
-/// Sends the voxels of mode sliced, or the toggles of mode solid, inside `clip` to `sink`, as if no triangle were tiny.
-#[inline(always)]
-pub(super) fn centres<'a, V: Simd, R: VectorRule, S: Sink>(
-    simd: V,
-    rule: &R,
-    mesh: &LatticeMesh<'_>,
-    pieces: impl Iterator<Item = Selected<'a>>,
-    clip: &VoxelBox,
-    sink: &mut S,
-) {
-    let mut others = Others::default();
-    let base = base(mesh, clip);
-    let near = NearClip::new(simd, clip, base);
-    for_each_vector(
-        simd,
-        pieces,
-        base,
-        sink,
-        #[inline(always)]
-        |sink, triangles, at, corners, lanes| {
-            let columns = crossings::columns(&corners, &near);
-            let mut some = lanes;
-            for [low, high] in columns {
-                some &= low.simd_le(high).to_bitmask();
-            }
-            if S::LEAVES {
-                leave(triangles, at, some, columns, &near, sink);
-            } else if some != 0 {
-                others.send(simd, rule, triangles, at, &corners, some, clip, &near, sink);
-            }
-        },
-    );
     others.finish(simd, rule, &near, sink);
 }

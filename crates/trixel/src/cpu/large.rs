@@ -102,7 +102,7 @@ pub(super) fn voxelize<R: Rule>(
     scratch: &mut Scratch,
 ) {
     let around = VoxelBox::around(triangle);
-    let wanted = if R::SURFACE { around } else { VoxelBox::below_and_above(triangle, clip) };
+    let wanted = if R::SURFACE { around } else { VoxelBox::columns(triangle, clip) };
     let Some(clipped) = &wanted.clipped(clip) else { return };
     let extent = around.extent();
     if extent[0].max(extent[1]).max(extent[2]) <= MEDIUM_EXTENT && rule.fits_small() {

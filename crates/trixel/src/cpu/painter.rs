@@ -7,8 +7,8 @@ use fearless_simd::{Level, dispatch};
 use super::kernel::{self, VoxelBox};
 #[cfg(feature = "threads")]
 use super::outbox::{Outbox, STRIPS};
-use super::rule::{Conservative, Sliced, Solid, SurfaceRule, Thin};
-use super::sink::{CubeSink, SetRuns, Slab, ToggleRuns};
+use super::rule::{Conservative, Sliced, Solid, SurfaceRule, Thin, VectorRule};
+use super::sink::{CubeSink, SetRuns, Sink, Slab, ToggleRuns};
 use super::triangles::Selected;
 use crate::job::Job;
 use crate::lattice::{LatticeMesh, STEP_BITS};
@@ -52,8 +52,7 @@ impl Painter {
             Mode::Conservative => surface(self.level, &Conservative, mesh, pieces, clip, &mut SetRuns(slab)),
             Mode::Thin => surface(self.level, &Thin, mesh, pieces, clip, &mut SetRuns(slab)),
             Mode::Sliced => {
-                let (rule, mut sink) = (Sliced { overlap: self.overlap }, SetRuns(slab));
-                dispatch!(self.level, simd => kernel::centres(simd, &rule, mesh, pieces, clip, &mut sink));
+                not_tiny(self.level, &Sliced { overlap: self.overlap }, mesh, pieces, clip, &mut SetRuns(slab));
             }
             Mode::Solid => {
                 let mut sink = ToggleRuns(slab);
@@ -84,8 +83,7 @@ impl Painter {
             Mode::Conservative => surface(self.level, &Conservative, mesh, pieces, grid, outbox),
             Mode::Thin => surface(self.level, &Thin, mesh, pieces, grid, outbox),
             Mode::Sliced => {
-                let rule = Sliced { overlap: self.overlap };
-                dispatch!(self.level, simd => kernel::centres(simd, &rule, mesh, pieces, grid, outbox));
+                not_tiny(self.level, &Sliced { overlap: self.overlap }, mesh, pieces, grid, outbox);
             }
             Mode::Solid => dispatch!(self.level, simd => kernel::solid(simd, &Solid, mesh, pieces, grid, outbox)),
         }
@@ -115,13 +113,9 @@ impl Painter {
             Mode::Conservative => not_tiny(self.level, &Conservative, mesh, pieces, clip, &mut SetRuns(into)),
             Mode::Thin => not_tiny(self.level, &Thin, mesh, pieces, clip, &mut SetRuns(into)),
             Mode::Sliced => {
-                let (rule, mut sink) = (Sliced { overlap: self.overlap }, SetRuns(into));
-                dispatch!(self.level, simd => kernel::centres(simd, &rule, mesh, pieces, clip, &mut sink));
+                not_tiny(self.level, &Sliced { overlap: self.overlap }, mesh, pieces, clip, &mut SetRuns(into));
             }
-            Mode::Solid => {
-                let mut sink = ToggleRuns(into);
-                dispatch!(self.level, simd => kernel::centres(simd, &Solid, mesh, pieces, clip, &mut sink));
-            }
+            Mode::Solid => not_tiny(self.level, &Solid, mesh, pieces, clip, &mut ToggleRuns(into)),
         }
     }
 }
@@ -140,16 +134,15 @@ fn move_voxels(from: &mut [u64], to: &mut [u64]) {
     }
 }
 
-#[cfg(feature = "threads")]
-fn not_tiny<'a, R: SurfaceRule>(
+fn not_tiny<'a, R: VectorRule>(
     level: Level,
     rule: &R,
     mesh: &LatticeMesh<'_>,
     pieces: impl Iterator<Item = Selected<'a>>,
     clip: &VoxelBox,
-    sink: &mut SetRuns<'_>,
+    sink: &mut impl Sink,
 ) {
-    dispatch!(level, simd => kernel::surface_not_tiny(simd, rule, mesh, pieces, clip, sink));
+    dispatch!(level, simd => kernel::not_tiny(simd, rule, mesh, pieces, clip, sink));
 }
 
 fn surface<'a, R: SurfaceRule>(

@@ -76,9 +76,9 @@ pub(super) fn split_centred<V: Simd>(n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f6
 /// N.v0 / S as the sum of a whole number and of fractions, for |N_i| below 2^44 and |v0| below 2^22 and two voxels. With `v0 =
 /// S p + r` and `N = S m + l`, N.p and m.r are whole, N.p below 3 * 2^44 * 67 < 2^52, and l.r is below 3 * 2^31.
 #[inline(always)]
-fn split_long<V: Simd>(n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+fn split_long<V: Simd>(simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
     let steps = f64::from(STEPS_PER_VOXEL);
-    let mut whole = n[0] * 0.0;
+    let mut whole = f64x8::splat(simd, 0.0);
     let mut rest = whole;
     for i in 0..3 {
         let p = (v0[i] * (1.0 / steps)).round_ties_even();
@@ -90,21 +90,21 @@ fn split_long<V: Simd>(n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<
     (whole, rest * (1.0 / steps))
 }
 
-/// [`VectorRule::edges`] of a surface mode.
-#[inline(always)]
-fn within_edges<V: Simd, R: SurfaceRule>(rule: &R, na: f64x8<V>, nb: f64x8<V>, nv: f64x8<V>) -> f64x8<V> {
-    let reach = na + nb + rule.centre_reach(na.abs(), nb.abs());
-    ((nv - reach * HALF) * (1.0 / f64::from(STEPS_PER_VOXEL))).ceil()
-}
+impl<R: SurfaceRule> VectorRule for R {
+    #[inline(always)]
+    fn edges<V: Simd>(&self, _simd: V, na: f64x8<V>, nb: f64x8<V>, nv: f64x8<V>) -> f64x8<V> {
+        let reach = na + nb + self.centre_reach(na.abs(), nb.abs());
+        ((nv - reach * HALF) * (1.0 / f64::from(STEPS_PER_VOXEL))).ceil()
+    }
 
-/// [`VectorRule::planes`] of a surface mode.
-#[inline(always)]
-fn within_planes<V: Simd, R: SurfaceRule>(rule: &R, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
-    let (whole, rest) = split_long(n, [v0[0] - HALF, v0[1] - HALF, v0[2] - HALF]);
-    let reach = rule.centre_plane_reach([n[0].abs(), n[1].abs(), n[2].abs()]) * 0.5;
-    let reach_whole = reach.floor();
-    let reach_rest = reach - reach_whole;
-    (whole - reach_whole + (rest - reach_rest).ceil(), whole + reach_whole + (rest + reach_rest).floor())
+    #[inline(always)]
+    fn planes<V: Simd>(&self, simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+        let (whole, rest) = split_long(simd, n, [v0[0] - HALF, v0[1] - HALF, v0[2] - HALF]);
+        let reach = self.centre_plane_reach([n[0].abs(), n[1].abs(), n[2].abs()]) * 0.5;
+        let reach_whole = reach.floor();
+        let reach_rest = reach - reach_whole;
+        (whole - reach_whole + (rest - reach_rest).ceil(), whole + reach_whole + (rest + reach_rest).floor())
+    }
 }
 
 /// [`centre_edge`] of eight triangles.
@@ -158,18 +158,6 @@ impl Rule for Conservative {
     }
 }
 
-impl VectorRule for Conservative {
-    #[inline(always)]
-    fn edges<V: Simd>(&self, _simd: V, na: f64x8<V>, nb: f64x8<V>, nv: f64x8<V>) -> f64x8<V> {
-        within_edges(self, na, nb, nv)
-    }
-
-    #[inline(always)]
-    fn planes<V: Simd>(&self, _simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
-        within_planes(self, n, v0)
-    }
-}
-
 impl SurfaceRule for Conservative {
     #[inline(always)]
     fn centre_reach<V: Simd, F: SimdFloat<V>>(&self, na: F, nb: F) -> F {
@@ -201,18 +189,6 @@ impl Rule for Thin {
         let (whole, rest) = split(n, v0, [-S / 2; 3]);
         let reach = half * abs(n[0]).max(abs(n[1])).max(abs(n[2]));
         (whole + ceil_voxels(rest - reach), whole + (rest + reach).floor_voxels())
-    }
-}
-
-impl VectorRule for Thin {
-    #[inline(always)]
-    fn edges<V: Simd>(&self, _simd: V, na: f64x8<V>, nb: f64x8<V>, nv: f64x8<V>) -> f64x8<V> {
-        within_edges(self, na, nb, nv)
-    }
-
-    #[inline(always)]
-    fn planes<V: Simd>(&self, _simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
-        within_planes(self, n, v0)
     }
 }
 
@@ -265,8 +241,8 @@ impl VectorRule for Solid {
     }
 
     #[inline(always)]
-    fn planes<V: Simd>(&self, _simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
-        let (whole, rest) = split_long(n, [v0[0] - HALF, v0[1] - HALF, v0[2] - HALF]);
+    fn planes<V: Simd>(&self, simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+        let (whole, rest) = split_long(simd, n, [v0[0] - HALF, v0[1] - HALF, v0[2] - HALF]);
         let d1 = whole + rest.ceil();
         (d1, d1)
     }
@@ -314,10 +290,10 @@ impl VectorRule for Sliced {
 
     #[inline(always)]
     #[expect(clippy::cast_precision_loss, reason = "less than two voxels")]
-    fn planes<V: Simd>(&self, _simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
+    fn planes<V: Simd>(&self, simd: V, n: [f64x8<V>; 3], v0: [f64x8<V>; 3]) -> (f64x8<V>, f64x8<V>) {
         let overlap = self.overlap as f64;
-        let (low, low_rest) = split_long(n, [v0[0] - HALF, v0[1] - HALF, v0[2] - overlap]);
-        let (high, high_rest) = split_long(n, [v0[0] - HALF, v0[1] - HALF, v0[2] + overlap]);
+        let (low, low_rest) = split_long(simd, n, [v0[0] - HALF, v0[1] - HALF, v0[2] - overlap]);
+        let (high, high_rest) = split_long(simd, n, [v0[0] - HALF, v0[1] - HALF, v0[2] + overlap]);
         (low + low_rest.ceil() - n[2], high + high_rest.floor())
     }
 }
