@@ -17,20 +17,15 @@
 
 use fearless_simd::{Simd, SimdFloat, f32x16, i32x16, prelude::*};
 
+use super::instructions::fuses;
 use super::rule::SurfaceRule;
 
 /// The longest side of a cuboid.
-const MOST: usize = 4;
+const MOST: usize = 3;
 
-/// Voxels of a cuboid of `A` by `B` by `C` in two halves: voxel `(x, y, z)` is bit `(B x + y) C + z`, from 32 on in the
-/// second.
-pub(super) type Bits = [i32; 2];
-
-/// [`Bits`] for each lane.
-pub(super) type Voxels<V> = [i32x16<V>; 2];
-
-/// For each cell of a projection, the voxels that it shows.
-type Cells = [[Bits; MOST]; MOST];
+/// For each cell of a projection, the voxels that it shows. Voxel `(x, y, z)` of a cuboid of `A` by `B` by `C` is bit
+/// `(B x + y) C + z`.
+type Cells = [[i32; MOST]; MOST];
 
 /// A share of the longest side by which an edge function may be off.
 const EDGE_DOUBT: f32 = 64.0 * UNIT;
@@ -50,41 +45,33 @@ impl<const A: usize, const B: usize, const C: usize> Cuboid<A, B, C> {
     /// The cells of the projections to yz, zx and xy.
     pub(super) const CELLS: [Cells; 3] = [cells::<A, B, C>(1, 2), cells::<A, B, C>(2, 0), cells::<A, B, C>(0, 1)];
     /// The layers across each axis.
-    pub(super) const LAYERS: [[Bits; MOST]; 3] = [across::<A, B, C>(0), across::<A, B, C>(1), across::<A, B, C>(2)];
-    /// The words of [`Bits`] in use.
-    pub(super) const WORDS: usize = (A * B * C).div_ceil(32);
+    pub(super) const LAYERS: [[i32; MOST]; 3] = [across::<A, B, C>(0), across::<A, B, C>(1), across::<A, B, C>(2)];
 }
 
 /// The bit of a voxel.
-const fn bit<const B: usize, const C: usize>(x: usize, y: usize, z: usize) -> Bits {
-    let bit = 1u64 << ((B * x + y) * C + z);
-    #[expect(clippy::cast_possible_truncation, reason = "the halves")]
-    [bit as i32, (bit >> 32) as i32]
+const fn bit<const B: usize, const C: usize>(x: usize, y: usize, z: usize) -> i32 {
+    1 << ((B * x + y) * C + z)
 }
 
 /// What the projection to the axes a and b shows in each of its cells.
 const fn cells<const A: usize, const B: usize, const C: usize>(a: usize, b: usize) -> Cells {
-    let mut cells = [[[0; 2]; MOST]; MOST];
+    let mut cells = [[0; MOST]; MOST];
     let mut voxel = 0;
     while voxel < A * B * C {
         let index = [voxel / (B * C), voxel / C % B, voxel % C];
-        let bit = bit::<B, C>(index[0], index[1], index[2]);
-        let cell = &mut cells[index[a]][index[b]];
-        *cell = [cell[0] | bit[0], cell[1] | bit[1]];
+        cells[index[a]][index[b]] |= bit::<B, C>(index[0], index[1], index[2]);
         voxel += 1;
     }
     cells
 }
 
 /// The voxels of each layer across an axis.
-const fn across<const A: usize, const B: usize, const C: usize>(axis: usize) -> [Bits; MOST] {
+const fn across<const A: usize, const B: usize, const C: usize>(axis: usize) -> [i32; MOST] {
     let cells = cells::<A, B, C>(axis, (axis + 1) % 3);
-    let mut layers = [[0; 2]; MOST];
+    let mut layers = [0; MOST];
     let mut i = 0;
     while i < MOST * MOST {
-        let cell = cells[i / MOST][i % MOST];
-        let layer = &mut layers[i / MOST];
-        *layer = [layer[0] | cell[0], layer[1] | cell[1]];
+        layers[i / MOST] |= cells[i / MOST][i % MOST];
         i += 1;
     }
     layers
@@ -93,7 +80,7 @@ const fn across<const A: usize, const B: usize, const C: usize>(axis: usize) -> 
 /// What is known of sixteen triangles.
 pub(super) struct Filtered<V: Simd> {
     /// The voxels that pass.
-    pub(super) voxels: Voxels<V>,
+    pub(super) voxels: i32x16<V>,
     /// Lanes in which rounding may have decided.
     pub(super) doubtful: u64,
 }
@@ -108,21 +95,25 @@ pub(super) fn cuboids<V: Simd, R: SurfaceRule, const A: usize, const B: usize, c
 ) -> Filtered<V> {
     let mut tests = Tests::new(simd, longest);
     let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
-    let n = [tests.cross(&e, 1, 2), tests.cross(&e, 2, 0), tests.cross(&e, 0, 1)];
-    let (words, cells) = (Cuboid::<A, B, C>::WORDS, &Cuboid::<A, B, C>::CELLS);
-    let mut voxels = tests.plane::<R, A, B, C>(simd, rule, n, v[0]);
-    let passing = [
-        tests.edges::<R, B, C>(simd, rule, &Projection::new(v, &e, 1, 2, n[0]), &cells[0], words),
-        tests.edges::<R, C, A>(simd, rule, &Projection::new(v, &e, 2, 0, n[1]), &cells[1], words),
-        tests.edges::<R, A, B>(simd, rule, &Projection::new(v, &e, 0, 1, n[2]), &cells[2], words),
-    ];
-    for word in 0..words {
-        voxels[word] &= passing[0][word] & passing[1][word] & passing[2][word];
+    let normal = &mut tests.normal;
+    let mut n = [normal.across(&e, 1, 2), normal.across(&e, 2, 0), normal.across(&e, 0, 1)];
+    if fuses(simd) && normal.doubtful(simd) != 0 {
+        *normal = Normal::new(simd);
+        n = [
+            normal.surely_across(simd, &e, 1, 2),
+            normal.surely_across(simd, &e, 2, 0),
+            normal.surely_across(simd, &e, 0, 1),
+        ];
     }
+    let cells = &Cuboid::<A, B, C>::CELLS;
+    let voxels = tests.plane::<R, A, B, C>(simd, rule, n, v[0])
+        & tests.edges::<R, B, C>(simd, rule, &Projection::new(v, &e, 1, 2, n[0]), &cells[0])
+        & tests.edges::<R, C, A>(simd, rule, &Projection::new(v, &e, 2, 0, n[1]), &cells[1])
+        & tests.edges::<R, A, B>(simd, rule, &Projection::new(v, &e, 0, 1, n[2]), &cells[2]);
     Filtered { voxels, doubtful: tests.doubtful(simd) }
 }
 
-/// The cells `(a, b)` of `SIDE` by `SIDE` that projections meet: bit `SIDE a + b` of the first half.
+/// The cells `(a, b)` of `SIDE` by `SIDE` that projections meet: bit `SIDE a + b`.
 #[inline(always)]
 pub(super) fn layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
@@ -132,9 +123,9 @@ pub(super) fn layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
 ) -> Filtered<V> {
     let mut tests = Tests::new(simd, longest);
     let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
-    let area = tests.cross(&e, 0, 1);
+    let area = tests.normal.across(&e, 0, 1);
     let cells = &Cuboid::<SIDE, SIDE, 1>::CELLS[2];
-    let voxels = tests.edges::<R, SIDE, SIDE>(simd, rule, &Projection { v: *v, e, area }, cells, 1);
+    let voxels = tests.edges::<R, SIDE, SIDE>(simd, rule, &Projection { v: *v, e, area }, cells);
     Filtered { voxels, doubtful: tests.doubtful(simd) }
 }
 
@@ -160,12 +151,51 @@ impl<V: Simd> Projection<V> {
     }
 }
 
+/// Components of normals, and how near they have come to having the wrong sign.
+pub(super) struct Normal<V: Simd> {
+    /// The least by which a component has the sign it seems to have.
+    least: f32x16<V>,
+}
+
+impl<V: Simd> Normal<V> {
+    #[inline(always)]
+    pub(super) fn new(simd: V) -> Self {
+        Self { least: f32x16::splat(simd, f32::MAX) }
+    }
+
+    /// The component across the axes i and j: off by at most `3 u` times the larger of its products.
+    #[inline(always)]
+    pub(super) fn across<const AXES: usize>(&mut self, e: &[[f32x16<V>; AXES]; 3], i: usize, j: usize) -> f32x16<V> {
+        let (p, q) = (e[0][i] * e[1][j], e[0][j] * e[1][i]);
+        let n = p - q;
+        self.least = self.least.min((p.abs() + q.abs()).mul_add(-NORMAL_DOUBT, n.abs()));
+        n
+    }
+
+    /// [`Self::across`], with the right sign wherever products and sums are fused: as quick, but later.
+    #[inline(always)]
+    pub(super) fn surely_across<const AXES: usize>(
+        &mut self,
+        simd: V,
+        e: &[[f32x16<V>; AXES]; 3],
+        i: usize,
+        j: usize,
+    ) -> f32x16<V> {
+        if fuses(simd) { determinant(e[0], e[1], i, j) } else { self.across(e, i, j) }
+    }
+
+    /// The lanes in which a sign may be wrong.
+    #[inline(always)]
+    pub(super) fn doubtful(&self, simd: V) -> u64 {
+        self.least.simd_lt(f32x16::splat(simd, 0.0)).to_bitmask()
+    }
+}
+
 /// How near to rounding the tests have come.
 pub(super) struct Tests<V: Simd> {
     edge_doubt: f32x16<V>,
     plane_doubt: f32x16<V>,
-    /// The least by which a component of the normal has the sign it seems to have.
-    normal: f32x16<V>,
+    pub(super) normal: Normal<V>,
     /// The least absolute values.
     pub(super) edge: f32x16<V>,
     pub(super) plane: f32x16<V>,
@@ -178,7 +208,7 @@ impl<V: Simd> Tests<V> {
         Self {
             edge_doubt: longest * EDGE_DOUBT,
             plane_doubt: longest * longest * PLANE_DOUBT,
-            normal: far,
+            normal: Normal::new(simd),
             edge: far,
             plane: far,
         }
@@ -186,17 +216,8 @@ impl<V: Simd> Tests<V> {
 
     #[inline(always)]
     pub(super) fn doubtful(&self, simd: V) -> u64 {
-        let doubt = (self.edge - self.edge_doubt).min(self.plane - self.plane_doubt).min(self.normal);
+        let doubt = (self.edge - self.edge_doubt).min(self.plane - self.plane_doubt).min(self.normal.least);
         doubt.simd_lt(f32x16::splat(simd, 0.0)).to_bitmask()
-    }
-
-    /// The component of the normal across the axes i and j.
-    #[inline(always)]
-    pub(super) fn cross<const AXES: usize>(&mut self, e: &[[f32x16<V>; AXES]; 3], i: usize, j: usize) -> f32x16<V> {
-        let (p, q) = (e[0][i] * e[1][j], e[0][j] * e[1][i]);
-        let n = p - q;
-        self.normal = self.normal.min((p.abs() + q.abs()).mul_add(-NORMAL_DOUBT, n.abs()));
-        n
     }
 
     /// The voxels within reach of the plane.
@@ -207,9 +228,9 @@ impl<V: Simd> Tests<V> {
         rule: &R,
         n: [f32x16<V>; 3],
         v: [f32x16<V>; 3],
-    ) -> Voxels<V> {
+    ) -> i32x16<V> {
         let zero = f32x16::splat(simd, 0.0);
-        let mut voxels = [i32x16::splat(simd, 0); 2];
+        let mut voxels = i32x16::splat(simd, 0);
         let reach = rule.centre_plane_reach([n[0].abs(), n[1].abs(), n[2].abs()]);
         let at_middle = n[2].mul_add(v[2], n[1].mul_add(v[1], n[0] * v[0]));
         for x in 0..A {
@@ -221,10 +242,7 @@ impl<V: Simd> Tests<V> {
                     let within = reach - at.abs();
                     self.plane = self.plane.min(within.abs());
                     let bits = bit::<B, C>(x, y, z);
-                    let passing = within.simd_ge(zero);
-                    for word in 0..Cuboid::<A, B, C>::WORDS {
-                        voxels[word] = passing.select(voxels[word] | bits[word], voxels[word]);
-                    }
+                    voxels = within.simd_ge(zero).select(voxels | bits, voxels);
                 }
             }
         }
@@ -239,8 +257,7 @@ impl<V: Simd> Tests<V> {
         rule: &R,
         &Projection { v, e, area }: &Projection<V>,
         cells: &Cells,
-        words: usize,
-    ) -> Voxels<V> {
+    ) -> i32x16<V> {
         let zero = f32x16::splat(simd, 0.0);
         // Inward normals point left of the edges when the projection turns left.
         let side = f32x16::splat(simd, 1.0).copysign(area);
@@ -258,23 +275,33 @@ impl<V: Simd> Tests<V> {
                 }
             }
         }
-        let mut voxels = [i32x16::splat(simd, 0); 2];
+        let mut voxels = i32x16::splat(simd, 0);
         for a in 0..A {
             for b in 0..B {
                 self.edge = self.edge.min(least[a][b].abs());
-                let passing = least[a][b].simd_ge(zero);
-                for word in 0..words {
-                    voxels[word] = passing.select(voxels[word] | cells[a][b][word], voxels[word]);
-                }
+                voxels = least[a][b].simd_ge(zero).select(voxels | cells[a][b], voxels);
             }
         }
         voxels
     }
 }
 
+/// `a_i b_j - a_j b_i`, where `mul_sub` rounds once: of the right sign, and 0 only if it is 0 (Kahan's algorithm).
+#[inline(always)]
+pub(super) fn determinant<V: Simd, F: SimdFloat<V>, const AXES: usize>(
+    a: [F; AXES],
+    b: [F; AXES],
+    i: usize,
+    j: usize,
+) -> F {
+    let product = a[j] * b[i];
+    let lost = a[j].mul_sub(b[i], product);
+    a[i].mul_sub(b[j], product) - lost
+}
+
 /// The centre of the `i`th voxel along a side.
 #[inline(always)]
-#[expect(clippy::cast_precision_loss, reason = "at most 4")]
+#[expect(clippy::cast_precision_loss, reason = "at most 3")]
 const fn centre<const SIDE: usize>(i: usize) -> f32 {
     2.0 * i as f32 - (SIDE - 1) as f32
 }

@@ -1,6 +1,6 @@
 //! The vector instructions that the kernel is compiled for; one set is picked at run time.
 
-use fearless_simd::Level;
+use fearless_simd::{Level, Simd};
 
 /// The newest vector instructions that a [`CpuBackend`](super::CpuBackend) may use. Every set gives the same voxels, so
 /// this is for tests and comparisons. A set that the processor or the architecture lacks means the best that it has.
@@ -30,4 +30,16 @@ impl Instructions {
         #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
         best
     }
+}
+
+/// Whether `mul_add` rounds once.
+#[inline(always)]
+pub(super) fn fuses<V: Simd>(simd: V) -> bool {
+    let level = simd.level();
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    return level.as_avx2().is_some();
+    #[cfg(target_arch = "aarch64")]
+    return level.as_neon().is_some();
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
+    false
 }

@@ -6,14 +6,16 @@
 //! | box | path |
 //! |---|---|
 //! | at most two voxels along each axis, where touching is enough | [`octants`](super::octants): sixteen triangles at a time |
-//! | at most four | [`tiny`]: sixteen triangles at a time |
-//! | the same, in mode solid | [`crossings`]: sixteen triangles at a time |
+//! | at most three, on surfaces | [`tiny`]: sixteen triangles at a time |
+//! | at most sixteen, and eight along x or y, on surfaces | [`columns`](super::columns): a column of sixteen triangles at a time |
+//! | at most four, in mode solid | [`crossings`]: sixteen triangles at a time |
 //! | one voxel along two axes, where touching is enough | the box itself |
-//! | at most 64 voxels | [`rows`]: eight columns at a time |
+//! | at most 64 voxels | [`rows`]: eight columns of a triangle at a time |
 //! | larger | [`large`]: runs that follow lines |
 
 use fearless_simd::{Simd, i32x16, prelude::*};
 
+use super::columns::Columns;
 use super::number::SMALL_EXTENT;
 use super::rule::{Solid, SurfaceRule, VectorRule};
 use super::sink::{CubeSink, Sink};
@@ -88,7 +90,7 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
     sink: &mut S,
 ) {
     let mut others = Others::default();
-    let mut waiting = Waiting::new();
+    let (mut waiting, mut columns) = (Waiting::new(), Columns::new());
     let base = base(mesh, clip);
     let near = NearClip::new(simd, clip, base);
     for_each_vector(
@@ -107,7 +109,7 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
             let longest = extent[0].max(extent[1]).max(extent[2]);
             let at_most = |voxels: i32| longest.simd_le(voxels - 1).to_bitmask();
             let inside = near.holds_z(&low, &high) & meets;
-            let mut tiny = at_most(4) & inside;
+            let mut tiny = at_most(3) & inside;
             let mut settled = 0;
             if R::TOUCH_IS_ENOUGH {
                 let boxed = (extent[0] + extent[1] + extent[2]).simd_le(1).to_bitmask() & tiny;
@@ -131,39 +133,42 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
                     tiny::flush_octants(simd, &mut waiting.twos, false, &near, sink);
                 }
             } else if two.count_ones() >= WORTH_CUBES {
-                simd.vectorize(
-                    #[inline(always)]
-                    || tiny::send_cubes::<_, _, 2>(simd, rule, &corners, two, &near, sink),
-                );
+                let flat = extent[0].min(extent[1]).min(extent[2]).simd_le(0).to_bitmask();
+                if two & !flat == 0 {
+                    simd.vectorize(
+                        #[inline(always)]
+                        || tiny::flats::<_, _, 2>(simd, rule, &corners, two, &near, sink),
+                    );
+                } else {
+                    simd.vectorize(
+                        #[inline(always)]
+                        || tiny::send_cubes::<_, _, 2>(simd, rule, &corners, two, &near, sink),
+                    );
+                }
             } else if two != 0 && waiting.twos.push(simd, &corners, two) {
                 tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, false, &near, sink);
             }
             tiny &= !two;
             if tiny != 0 {
-                let three = at_most(3) & tiny;
-                let four = tiny & !three;
                 let shortest = extent[0].min(extent[1]).min(extent[2]);
-                let flat = shortest.simd_le(0).to_bitmask();
-                if three & flat != 0 && waiting.flat_threes.push(simd, &corners, three & flat) {
+                let flat = shortest.simd_le(0).to_bitmask() & tiny;
+                if flat != 0 && waiting.flat_threes.push(simd, &corners, flat) {
                     tiny::flush_flats::<_, _, 3>(simd, rule, &mut waiting.flat_threes, false, &near, sink);
                 }
-                if four & flat != 0 && waiting.flat_fours.push(simd, &corners, four & flat) {
-                    tiny::flush_flats::<_, _, 4>(simd, rule, &mut waiting.flat_fours, false, &near, sink);
-                }
-                if three & !flat != 0 && waiting.threes.push(simd, &corners, three & !flat) {
+                if tiny & !flat != 0 && waiting.threes.push(simd, &corners, tiny & !flat) {
                     tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, false, &near, sink);
                 }
-                if four & !flat != 0 && waiting.fours.push(simd, &corners, four & !flat) {
-                    tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, false, &near, sink);
-                }
             }
-            let left = meets & !settled & !two & !tiny;
+            let mut left = meets & !settled & !two & !tiny;
             if S::LEAVES {
                 leave(triangles, at, left, [[low[0], high[0]], [low[1], high[1]]], &near, sink);
             } else if left != 0 {
-                // A copy, so that corners need not be in memory anywhere else.
-                let stored = corners;
-                others.send(simd, rule, triangles, at, &stored, left, clip, &near, sink);
+                left = columns.push(simd, rule, &corners, &extent, left, &near, &mut others.rows, sink);
+                if left != 0 {
+                    // A copy, so that corners need not be in memory anywhere else.
+                    let stored = corners;
+                    others.send(simd, rule, triangles, at, &stored, left, clip, &near, sink);
+                }
             }
         },
     );
@@ -173,10 +178,12 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
         tiny::flush::<_, _, 2>(simd, rule, &mut waiting.twos, true, &near, sink);
     }
     tiny::flush_flats::<_, _, 3>(simd, rule, &mut waiting.flat_threes, true, &near, sink);
-    tiny::flush_flats::<_, _, 4>(simd, rule, &mut waiting.flat_fours, true, &near, sink);
     tiny::flush::<_, _, 3>(simd, rule, &mut waiting.threes, true, &near, sink);
-    tiny::flush::<_, _, 4>(simd, rule, &mut waiting.fours, true, &near, sink);
+    if !S::LEAVES {
+        columns.finish(simd, rule, &near, &mut others.rows, sink);
+    }
     others.finish(simd, rule, &near, sink);
+    sink.finish(simd);
 }
 
 /// Leaves the triangles in `lanes` of the vector that starts with the `at`th, with the columns that they have along
@@ -199,8 +206,8 @@ fn leave<V: Simd>(
     }
 }
 
-/// Sends the voxels of any mode inside `clip`, or the toggles of mode solid, to `sink`, until it is full or there are no more
-/// pieces: as if no triangle were tiny.
+/// Sends the voxels of mode sliced inside `clip`, or the toggles of mode solid, to `sink`, until it is full or there are no
+/// more pieces: as if no triangle were tiny.
 #[inline(always)]
 pub(super) fn not_tiny<'a, V: Simd, R: VectorRule, S: Sink>(
     simd: V,
@@ -220,15 +227,9 @@ pub(super) fn not_tiny<'a, V: Simd, R: VectorRule, S: Sink>(
         sink,
         #[inline(always)]
         |sink, triangles, at, corners, mut lanes| {
-            let [low, high] = corners.boxes();
-            let mut columns = [[low[0], high[0]], [low[1], high[1]]];
-            if R::SURFACE {
-                lanes &= near.meets(&low, &high);
-            } else {
-                columns = crossings::columns(&corners, &near);
-                for [first, last] in columns {
-                    lanes &= first.simd_le(last).to_bitmask();
-                }
+            let columns = crossings::columns(&corners, &near);
+            for [first, last] in columns {
+                lanes &= first.simd_le(last).to_bitmask();
             }
             if S::LEAVES {
                 leave(triangles, at, lanes, columns, &near, sink);
@@ -367,7 +368,7 @@ pub(super) struct NearClip<V: Simd> {
 
 impl<V: Simd> NearClip<V> {
     #[inline(always)]
-    fn new(simd: V, clip: &VoxelBox, base: [i64; 3]) -> Self {
+    pub(super) fn new(simd: V, clip: &VoxelBox, base: [i64; 3]) -> Self {
         let splat = |voxel: [i64; 3]| {
             // Clips are pieces of grids, which have at most 32768 voxels along an axis.
             let near =
@@ -406,16 +407,14 @@ impl<V: Simd> NearClip<V> {
 struct Waiting {
     twos: Queue,
     threes: Queue,
-    fours: Queue,
-    /// At most as many voxels along two axes, and one along the third.
+    /// At most three voxels along two axes, and one along the third.
     flat_threes: Queue,
-    flat_fours: Queue,
 }
 
 impl Waiting {
     fn new() -> Self {
         const NONE: Queue = Queue::EMPTY;
-        Self { twos: NONE, threes: NONE, fours: NONE, flat_threes: NONE, flat_fours: NONE }
+        Self { twos: NONE, threes: NONE, flat_threes: NONE }
     }
 }
 

@@ -17,6 +17,7 @@
 //!   that with
 //! - `pillars`: a sparse grid cut into pillars of bricks
 
+mod columns;
 mod crossings;
 mod filter;
 pub(crate) mod fragments;

@@ -43,7 +43,7 @@ pub(super) fn voxels<V: Simd>(
     let signs = Signs::new(&v);
     let mut tests = Tests::new(simd, longest);
     for i in 0..3 {
-        tests.cross(&signs.e, (i + 1) % 3, (i + 2) % 3);
+        tests.normal.across(&signs.e, (i + 1) % 3, (i + 2) % 3);
         for k in 0..3 {
             tests.edge = tests.edge.min(signs.edges[i][k].abs());
         }

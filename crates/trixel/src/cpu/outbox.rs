@@ -4,8 +4,7 @@ use std::ops::Range;
 
 use fearless_simd::{Simd, i32x16, prelude::*};
 
-use super::filter::Voxels;
-use super::sink::{CubeSink, InWords, Sink, Slab, Steps, bits_of, set_columns, set_cube};
+use super::sink::{ColumnSink, CubeSink, InWords, Place, Sink, Slab};
 use super::triangles::{LANES, Lanes};
 use crate::volume::WORD_BITS;
 
@@ -79,11 +78,11 @@ impl Cuts {
         self.of_x.get(usize::try_from(x).ok()?).map(|of_x| of_x.slab as usize)
     }
 
-    /// What is added to words of the grid so that those of all cubes are at least 0: cubes begin at most three columns before
-    /// a layer.
+    /// What is added to words of the grid so that those of all cubes are at least 0: cubes begin at most two columns before a
+    /// layer.
     #[inline(always)]
     fn bias(&self) -> usize {
-        3 * self.column_words
+        2 * self.column_words
     }
 }
 
@@ -92,7 +91,7 @@ impl Cuts {
 pub(super) struct Compartment {
     /// Cubes of 2^3 voxels, or toggles: a place and the bits.
     small: Vec<u64>,
-    /// Larger cubes: their bits, and a place with 0 or 1 for a side of 3 or 4.
+    /// Cubes of 3^3: their bits, and a place.
     cubes: Vec<[u64; 2]>,
     /// The numbers of triangles to be voxelized inside the slab, by the strip in which their boxes begin.
     triangles: [Vec<u32>; STRIPS],
@@ -137,19 +136,15 @@ impl<'a> Outbox<'a> {
     /// Sets the voxels left to a slab.
     pub(super) fn set(&self, slab: usize, into: &mut Slab<'_>) {
         // What is behind a reference to a slab would be loaded again after each word.
-        let steps = into.steps();
+        let steps = Steps::of(into);
         let words = &mut *into.words;
         for &entry in &self.slabs[slab].small {
             let (word, shift) = self.unpack(slab, entry >> SMALL_BITS);
             paint_cube::<2>(words, steps, word, entry & ((1 << SMALL_BITS) - 1), shift);
         }
-        for &[bits, entry] in &self.slabs[slab].cubes {
-            let (word, shift) = self.unpack(slab, entry >> 1);
-            if entry & 1 == 0 {
-                paint_cube::<3>(words, steps, word, bits, shift);
-            } else {
-                paint_cube::<4>(words, steps, word, bits, shift);
-            }
+        for &[bits, place] in &self.slabs[slab].cubes {
+            let (word, shift) = self.unpack(slab, place);
+            paint_cube::<3>(words, steps, word, bits, shift);
         }
     }
 
@@ -184,7 +179,7 @@ impl<'a> Outbox<'a> {
         if SIDE == 2 {
             small.push(place << SMALL_BITS | bits);
         } else {
-            cubes.push([bits, place << 1 | u64::from(SIDE == 4)]);
+            cubes.push([bits, place]);
         }
     }
 
@@ -244,11 +239,91 @@ impl Sink for Outbox<'_> {
     }
 }
 
+/// Words from a column to the next along x, and along y.
+#[derive(Clone, Copy)]
+struct Steps {
+    layer: u32,
+    beside: u32,
+}
+
+impl Steps {
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "at most 2^15 columns of 2^9 words")]
+    fn of(slab: &Slab<'_>) -> Self {
+        Self { layer: slab.layer() as u32, beside: slab.column_words as u32 }
+    }
+}
+
+/// Sets the voxels of a cube whose columns' bits are in the words from `first` on, and `steps` further along x and y: of all
+/// columns without asking which have any, as that guess is wrong too often. `false`, and nothing done, where a column needs
+/// two words, or some would not be among the words: then it is for [`set_columns`].
+#[inline(always)]
+#[expect(clippy::cast_sign_loss, reason = "too large, then")]
+fn set_cube<const SIDE: usize>(words: &mut [u64], steps: Steps, first: isize, bits: u64, shift: u32) -> bool {
+    if shift > WORD_BITS - side::<SIDE>() {
+        return false;
+    }
+    // Of numbers known to be small, the compiler sees that no word is past the last.
+    let (layer, beside) = (steps.layer as usize, steps.beside as usize);
+    let last = (SIDE - 1) * (layer + beside);
+    // At the end of a row, the column beside is the first of the next: its bits are 0 then.
+    let Some(words) = words.get_mut(first as usize..) else { return false };
+    if words.len() <= last {
+        return false;
+    }
+    for x in 0..SIDE {
+        for y in 0..SIDE {
+            let run = bits >> ((SIDE * x + y) * SIDE) & ((1 << SIDE) - 1);
+            words[x * layer + y * beside] |= run << shift;
+        }
+    }
+    true
+}
+
+/// [`set_cube`] column by column; those without voxels may lie outside the words.
+#[cold]
+#[inline(never)]
+#[expect(clippy::cast_sign_loss, reason = "voxels are inside the slab")]
+fn set_columns<const SIDE: usize>(words: &mut [u64], steps: Steps, first: isize, mut bits: u64, shift: u32) {
+    let side = side::<SIDE>();
+    while bits != 0 {
+        let column = bits.trailing_zeros() / side;
+        let run = bits >> (column * side) & ((1 << side) - 1);
+        bits ^= run << (column * side);
+        let (x, y) = ((column / side) as usize, (column % side) as usize);
+        let word = first.wrapping_add_unsigned(x * steps.layer as usize + y * steps.beside as usize) as usize;
+        words[word] |= run << shift;
+        if shift > WORD_BITS - side {
+            let above = run >> (WORD_BITS - shift);
+            if above != 0 {
+                words[word + 1] |= above;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "at most 4")]
+const fn side<const SIDE: usize>() -> u32 {
+    SIDE as u32
+}
+
 #[inline(always)]
 fn paint_cube<const SIDE: usize>(words: &mut [u64], steps: Steps, first: isize, bits: u64, shift: u32) {
     if !set_cube::<SIDE>(words, steps, first, bits, shift) {
         set_columns::<SIDE>(words, steps, first, bits, shift);
     }
+}
+
+impl ColumnSink for Outbox<'_> {
+    fn place<V: Simd>(&self, low: &[i32x16<V>; 3], _base: [i64; 3]) -> Place<V> {
+        Place { column: low[0], z: low[2], row: 0 }
+    }
+
+    /// There are none: triangles with more than small cubes are left.
+    fn columns<V: Simd>(&mut self, _simd: V, _at: i32x16<V>, _from: i32x16<V>, _bits: i32x16<V>, _lanes: Lanes) {}
+
+    fn finish<V: Simd>(&mut self, _simd: V) {}
 }
 
 impl CubeSink for Outbox<'_> {
@@ -265,14 +340,14 @@ impl CubeSink for Outbox<'_> {
         clippy::cast_sign_loss,
         reason = "places as in `place`; an x below 0 is too large then"
     )]
-    fn cubes<V: Simd, const SIDE: usize>(&mut self, at: &InWords<V>, voxels: &Voxels<V>, mut lanes: Lanes) {
+    fn cubes<V: Simd, const SIDE: usize>(&mut self, _simd: V, at: &InWords<V>, voxels: i32x16<V>, mut lanes: Lanes) {
         let bias = self.cuts.bias() as i64;
         let (first, second) = at.shifts.widen();
         let places = [(at.words[0] + bias) << SHIFT_BITS | first, (at.words[1] + bias) << SHIFT_BITS | second];
-        let (x, places, bits) = (*at.x, [*places[0], *places[1]], [*voxels[0], *voxels[1]]);
+        let (x, places, bits) = (*at.x, [*places[0], *places[1]], *voxels);
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LANES;
-            let (place, bits) = (places.as_flattened()[lane] as u64, bits_of::<SIDE>(&bits, lane));
+            let (place, bits) = (places.as_flattened()[lane] as u64, u64::from(bits[lane].cast_unsigned()));
             match self.cuts.of_x.get(x[lane] as u32 as usize) {
                 Some(of_x) if of_x.left as usize >= SIDE => self.push::<SIDE>(of_x.slab as usize, place, bits),
                 _ => self.push_layers::<SIDE>(i64::from(x[lane]), place, bits),

@@ -49,10 +49,10 @@ impl Painter {
         slab: Slab<'_>,
     ) {
         match self.mode {
-            Mode::Conservative => surface(self.level, &Conservative, mesh, pieces, clip, &mut SetRuns(slab)),
-            Mode::Thin => surface(self.level, &Thin, mesh, pieces, clip, &mut SetRuns(slab)),
+            Mode::Conservative => surface(self.level, &Conservative, mesh, pieces, clip, &mut SetRuns::new(slab)),
+            Mode::Thin => surface(self.level, &Thin, mesh, pieces, clip, &mut SetRuns::new(slab)),
             Mode::Sliced => {
-                not_tiny(self.level, &Sliced { overlap: self.overlap }, mesh, pieces, clip, &mut SetRuns(slab));
+                not_tiny(self.level, &Sliced { overlap: self.overlap }, mesh, pieces, clip, &mut SetRuns::new(slab));
             }
             Mode::Solid => {
                 let mut sink = ToggleRuns(slab);
@@ -110,10 +110,10 @@ impl Painter {
         let strips = (0..STRIPS).flat_map(|strip| outboxes.clone().map(move |outbox| outbox.triangles(slab, strip)));
         let pieces = strips.map(|numbers| Selected::listed(mesh, numbers));
         match self.mode {
-            Mode::Conservative => not_tiny(self.level, &Conservative, mesh, pieces, clip, &mut SetRuns(into)),
-            Mode::Thin => not_tiny(self.level, &Thin, mesh, pieces, clip, &mut SetRuns(into)),
+            Mode::Conservative => surface(self.level, &Conservative, mesh, pieces, clip, &mut SetRuns::new(into)),
+            Mode::Thin => surface(self.level, &Thin, mesh, pieces, clip, &mut SetRuns::new(into)),
             Mode::Sliced => {
-                not_tiny(self.level, &Sliced { overlap: self.overlap }, mesh, pieces, clip, &mut SetRuns(into));
+                not_tiny(self.level, &Sliced { overlap: self.overlap }, mesh, pieces, clip, &mut SetRuns::new(into));
             }
             Mode::Solid => not_tiny(self.level, &Solid, mesh, pieces, clip, &mut ToggleRuns(into)),
         }

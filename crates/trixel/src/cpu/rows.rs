@@ -149,7 +149,7 @@ impl Boxes {
 
 /// Exchanges x and y.
 #[inline(always)]
-fn exchange<V: Simd>(across: mask32x16<V>, [x, y, z]: [i32x16<V>; 3]) -> [i32x16<V>; 3] {
+pub(super) fn exchange<V: Simd>(across: mask32x16<V>, [x, y, z]: [i32x16<V>; 3]) -> [i32x16<V>; 3] {
     [across.select(y, x), across.select(x, y), z]
 }
 

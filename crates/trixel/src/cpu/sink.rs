@@ -1,8 +1,7 @@
 //! Where the kernel's runs go: bits of a slab of columns.
 
-use fearless_simd::{Simd, i32x16, i64x8, prelude::*};
+use fearless_simd::{Simd, i32x16, i64x8, mask32x16, prelude::*};
 
-use super::filter::Voxels;
 use super::prefetch::{self, prefetch};
 use super::rows::Tile;
 use super::triangles::{LANES, Lanes};
@@ -50,8 +49,20 @@ pub(super) trait Sink {
     }
 }
 
+/// Receives parts of columns too, several at once.
+pub(super) trait ColumnSink: Sink {
+    /// Looks up voxels seen from the voxel `base`.
+    fn place<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> Place<V>;
+
+    /// Voxels in `lanes`: of the columns with these numbers, those whose bit from `from` on, as seen from the piece, is set.
+    fn columns<V: Simd>(&mut self, simd: V, columns: i32x16<V>, from: i32x16<V>, bits: i32x16<V>, lanes: Lanes);
+
+    /// Does what was put off.
+    fn finish<V: Simd>(&mut self, simd: V);
+}
+
 /// Receives cubes of voxels too, several at once.
-pub(super) trait CubeSink: Sink {
+pub(super) trait CubeSink: ColumnSink {
     /// Where cubes go.
     type Places<V: Simd>;
 
@@ -61,7 +72,7 @@ pub(super) trait CubeSink: Sink {
 
     /// Voxels of cubes of `SIDE` in `lanes`: those `(x, y, z)` from the corner whose bit `(SIDE x + y) SIDE + z` is set, all
     /// inside the clip.
-    fn cubes<V: Simd, const SIDE: usize>(&mut self, places: &Self::Places<V>, voxels: &Voxels<V>, lanes: Lanes);
+    fn cubes<V: Simd, const SIDE: usize>(&mut self, simd: V, places: &Self::Places<V>, voxels: i32x16<V>, lanes: Lanes);
 }
 
 /// Where voxels are among a piece's words.
@@ -71,6 +82,7 @@ pub(super) struct InWords<V: Simd> {
     pub(super) x: i32x16<V>,
     /// Outside the piece: past its end, below 0, or a word for which no bit will be set.
     pub(super) words: [i64x8<V>; 2],
+    #[cfg(feature = "threads")]
     pub(super) shifts: i32x16<V>,
 }
 
@@ -98,31 +110,19 @@ impl<V: Simd> InWords<V> {
             #[cfg(feature = "threads")]
             x: at[0],
             words: [first + above_first, second + above_second],
+            #[cfg(feature = "threads")]
             shifts: at[2] & (WORD_BITS as i32 - 1),
         }
     }
 }
 
-/// Where the low corners of cubes are among a piece's words, lane by lane.
-pub(super) struct Places {
-    words: [[i64; LANES / 2]; 2],
-    shifts: [i32; LANES],
-}
-
-impl Places {
-    /// The word and the shift of a lane.
-    #[inline(always)]
-    #[expect(clippy::cast_sign_loss, clippy::cast_possible_truncation, reason = "of a word")]
-    fn of(&self, lane: usize) -> (isize, u32) {
-        (self.words.as_flattened()[lane % LANES] as isize, self.shifts[lane % LANES] as u32)
-    }
-}
-
-/// Bits of the cube of a lane.
-#[inline(always)]
-pub(super) fn bits_of<const SIDE: usize>(words: &[[i32; LANES]; 2], lane: usize) -> u64 {
-    let word = |i: usize| u64::from(words[i][lane % LANES].cast_unsigned());
-    if SIDE < 4 { word(0) } else { word(0) | word(1) << 32 }
+/// Where voxels are in a piece.
+pub(super) struct Place<V: Simd> {
+    /// The number of the column.
+    pub(super) column: i32x16<V>,
+    pub(super) z: i32x16<V>,
+    /// Columns from one to the next along x.
+    pub(super) row: i32,
 }
 
 /// The words of a piece of the grid: what one thread owns.
@@ -135,13 +135,6 @@ pub(super) struct Slab<'a> {
     pub(super) column_words: usize,
 }
 
-/// Words from a column to the next along x, and along y.
-#[derive(Clone, Copy)]
-pub(super) struct Steps {
-    layer: u32,
-    beside: u32,
-}
-
 impl<'a> Slab<'a> {
     /// The same piece, for a shorter time.
     pub(super) fn reborrow(&mut self) -> Slab<'_> {
@@ -150,14 +143,8 @@ impl<'a> Slab<'a> {
 
     /// Words of a layer across x.
     #[inline(always)]
-    fn layer(&self) -> usize {
+    pub(super) fn layer(&self) -> usize {
         self.columns * self.column_words
-    }
-
-    #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "at most 2^15 columns of 2^9 words")]
-    pub(super) fn steps(&self) -> Steps {
-        Steps { layer: self.layer() as u32, beside: self.column_words as u32 }
     }
 
     #[inline(always)]
@@ -169,93 +156,150 @@ impl<'a> Slab<'a> {
     }
 }
 
-/// Sets the voxels of a cube whose columns' bits are in the words from `first` on, and `steps` further along x and y: of all
-/// columns without asking which have any, as that guess is wrong too often. `false`, and nothing done, where a column needs
-/// two words, or some would not be among the words: then it is for [`set_columns`].
-#[inline(always)]
-#[expect(clippy::cast_sign_loss, reason = "too large, then")]
-pub(super) fn set_cube<const SIDE: usize>(
-    words: &mut [u64],
-    steps: Steps,
-    first: isize,
-    bits: u64,
-    shift: u32,
-) -> bool {
-    if shift > WORD_BITS - side::<SIDE>() {
-        return false;
-    }
-    // Of numbers known to be small, the compiler sees that no word is past the last.
-    let (layer, beside) = (steps.layer as usize, steps.beside as usize);
-    let last = (SIDE - 1) * (layer + beside);
-    // At the end of a row, the column beside is the first of the next: its bits are 0 then.
-    let Some(words) = words.get_mut(first as usize..) else { return false };
-    if words.len() <= last {
-        return false;
-    }
-    for x in 0..SIDE {
-        for y in 0..SIDE {
-            let run = bits >> ((SIDE * x + y) * SIDE) & ((1 << SIDE) - 1);
-            words[x * layer + y * beside] |= run << shift;
-        }
-    }
-    true
-}
-
-/// [`set_cube`] column by column; those without voxels may lie outside the words.
-#[cold]
-#[inline(never)]
-#[expect(clippy::cast_sign_loss, reason = "voxels are inside the slab")]
-pub(super) fn set_columns<const SIDE: usize>(words: &mut [u64], steps: Steps, first: isize, mut bits: u64, shift: u32) {
-    let side = side::<SIDE>();
-    while bits != 0 {
-        let column = bits.trailing_zeros() / side;
-        let run = bits >> (column * side) & ((1 << side) - 1);
-        bits ^= run << (column * side);
-        let (x, y) = ((column / side) as usize, (column % side) as usize);
-        let word = first.wrapping_add_unsigned(x * steps.layer as usize + y * steps.beside as usize) as usize;
-        words[word] |= run << shift;
-        if shift > WORD_BITS - side {
-            let above = run >> (WORD_BITS - shift);
-            if above != 0 {
-                words[word + 1] |= above;
-            }
-        }
-    }
-}
-
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "at most 4")]
-const fn side<const SIDE: usize>() -> u32 {
-    SIDE as u32
-}
-
 /// Sets the voxels of a run.
-pub(super) struct SetRuns<'a>(pub(super) Slab<'a>);
+pub(super) struct SetRuns<'a> {
+    slab: Slab<'a>,
+    /// Words, and bits above their shift, in [`SHIFT_BITS`].
+    parts: Waiting,
+    /// Columns, and bits of which the lowest voxel is above them, from [`MOST_BITS`] on.
+    columns: Waiting,
+}
+
+/// Parts of columns that wait, so that the loop that sets them is long.
+struct Waiting {
+    count: usize,
+    places: [i32; MOST_WAITING],
+    bits: [i32; MOST_WAITING],
+}
+
+/// Waiting parts from which on they are set.
+const FULL: usize = 256;
+const MOST_WAITING: usize = FULL + LANES;
+
+/// Bits of a shift.
+const SHIFT_BITS: u32 = WORD_SHIFT;
+/// Voxels of a part of a column at most.
+pub(super) const MOST_BITS: u32 = 16;
+
+impl Waiting {
+    const NONE: Self = Self { count: 0, places: [0; MOST_WAITING], bits: [0; MOST_WAITING] };
+
+    /// Adds those in `lanes`; `true` when they are to be set before the next.
+    #[inline(always)]
+    fn push<V: Simd>(&mut self, places: i32x16<V>, bits: i32x16<V>, lanes: mask32x16<V>) -> bool {
+        let at = self.count.min(FULL);
+        places.compress(lanes).store_slice(&mut self.places[at..at + LANES]);
+        bits.compress(lanes).store_slice(&mut self.bits[at..at + LANES]);
+        self.count = at + lanes.to_bitmask().count_ones() as usize;
+        self.count > FULL
+    }
+
+    /// Those that wait, which then do so no longer.
+    #[inline(always)]
+    #[expect(clippy::cast_sign_loss, reason = "never below 0")]
+    fn take(&mut self) -> impl Iterator<Item = (usize, u32)> {
+        let count = self.count.min(MOST_WAITING);
+        self.count = 0;
+        self.places[..count].iter().zip(&self.bits[..count]).map(|(&place, &bits)| (place as usize, bits as u32))
+    }
+}
+
+impl<'a> SetRuns<'a> {
+    pub(super) fn new(slab: Slab<'a>) -> Self {
+        Self { slab, parts: Waiting::NONE, columns: Waiting::NONE }
+    }
+
+    /// Sets the parts that wait.
+    #[inline(never)]
+    fn set_parts<V: Simd>(&mut self, simd: V) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let words = &mut *self.slab.words;
+                for (word, bits) in self.parts.take() {
+                    words[word] |= u64::from(bits >> SHIFT_BITS) << (bits % WORD_BITS);
+                }
+            },
+        );
+    }
+
+    /// Sets the columns that wait.
+    #[inline(never)]
+    fn set_columns<V: Simd>(&mut self, simd: V) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let Slab { words, column_words, .. } = &mut self.slab;
+                for (column, bits) in self.columns.take() {
+                    let (from, bits) = (bits >> MOST_BITS, u64::from(bits % (1 << MOST_BITS)));
+                    let word = column * *column_words + (from / WORD_BITS) as usize;
+                    words[word] |= bits << (from % WORD_BITS);
+                    let above = bits >> (WORD_BITS - 1 - from % WORD_BITS) >> 1;
+                    if above != 0 {
+                        words[word + 1] |= above;
+                    }
+                }
+            },
+        );
+    }
+
+    /// Cubes, as columns.
+    #[inline(never)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "at most 64")]
+    fn cubes_as_columns<V: Simd, const SIDE: usize>(
+        &mut self,
+        simd: V,
+        place: &Place<V>,
+        voxels: i32x16<V>,
+        lanes: Lanes,
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                for x in 0..SIDE {
+                    for y in 0..SIDE {
+                        let bits = bits_of_column::<V, SIDE>(voxels, x, y);
+                        let column = place.column + (x as i32 * place.row + y as i32);
+                        let some = bits.simd_gt(i32x16::splat(simd, 0)).to_bitmask();
+                        self.columns(simd, column, place.z, bits, some & lanes);
+                    }
+                }
+            },
+        );
+    }
+}
+
+/// The bits of a column of cubes of `SIDE`.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "at most 64")]
+fn bits_of_column<V: Simd, const SIDE: usize>(voxels: i32x16<V>, x: usize, y: usize) -> i32x16<V> {
+    voxels >> ((SIDE * x + y) * SIDE) as u32 & ((1 << SIDE) - 1)
+}
 
 impl Sink for SetRuns<'_> {
     #[inline(always)]
     fn prefetches(&self) -> bool {
         /// Words that come quickly enough: 5 MiB, measured.
         const NEAR: usize = 5 << 17;
-        prefetch::POSSIBLE && self.0.words.len() > NEAR
+        prefetch::POSSIBLE && self.slab.words.len() > NEAR
     }
 
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an address, whatever it is")]
     fn prefetch<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) {
-        let InWords { words, .. } = InWords::new(low, base, self.0.start, self.0.columns, self.0.column_words);
+        let InWords { words, .. } = InWords::new(low, base, self.slab.start, self.slab.columns, self.slab.column_words);
         // The columns beside are near enough.
         for &at in [*words[0], *words[1]].as_flattened() {
-            prefetch(self.0.words, at as usize);
-            prefetch(self.0.words, (at as usize).wrapping_add(self.0.layer()));
+            prefetch(self.slab.words, at as usize);
+            prefetch(self.slab.words, (at as usize).wrapping_add(self.slab.layer()));
         }
     }
 
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
     fn run(&mut self, x: i64, y: i64, from: i64, to: i64) {
-        let (from, to) = ((from - self.0.start[2]) as u32, (to - self.0.start[2]) as u32);
-        let column = self.0.column(x, y);
+        let (from, to) = ((from - self.slab.start[2]) as u32, (to - self.slab.start[2]) as u32);
+        let column = self.slab.column(x, y);
         let (first, last) = ((from / WORD_BITS) as usize, (to / WORD_BITS) as usize);
         let from_bits = u64::MAX << (from % WORD_BITS);
         let to_bits = u64::MAX >> (WORD_BITS - 1 - to % WORD_BITS);
@@ -271,7 +315,7 @@ impl Sink for SetRuns<'_> {
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
     fn tile(&mut self, at: [i64; 3], turned: bool, columns: u64, from: &Tile, to: &Tile, last_z: i64) {
-        let Slab { words, start, columns: row, column_words } = &mut self.0;
+        let Slab { words, start, columns: row, column_words } = &mut self.slab;
         let [x, y, z] = [0, 1, 2].map(|i| (at[i] - start[i]) as usize);
         let first = (x * *row + y) * *column_words + z / WORD_BITS as usize;
         let [step, beside] = turn(turned, [*row * *column_words, *column_words]);
@@ -315,39 +359,84 @@ fn for_each_column(mut columns: u64, mut each: impl FnMut(usize)) {
     }
 }
 
-impl CubeSink for SetRuns<'_> {
-    type Places<V: Simd> = Places;
-
+impl ColumnSink for SetRuns<'_> {
     #[inline(always)]
-    fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> Places {
-        let InWords { words, shifts, .. } = InWords::new(low, base, self.0.start, self.0.columns, self.0.column_words);
-        Places { words: [*words[0], *words[1]], shifts: *shifts }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "below 2^30")]
+    fn place<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> Place<V> {
+        let Slab { start, columns, .. } = self.slab;
+        let [x, y, z] = [(base[0] - start[0]) as i32, (base[1] - start[1]) as i32, (base[2] - start[2]) as i32];
+        let row = columns as i32;
+        Place { column: (low[0] + x) * row + (low[1] + y), z: low[2] + z, row }
     }
 
     #[inline(always)]
-    fn cubes<V: Simd, const SIDE: usize>(&mut self, places: &Places, voxels: &Voxels<V>, mut lanes: Lanes) {
-        // What is behind a reference to a slab would be loaded again after each word.
-        let steps = self.0.steps();
-        let words = &mut *self.0.words;
-        let bits = [*voxels[0], *voxels[1]];
-        // Those that need a call, kept out of the loop.
-        let mut left = 0u64;
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            let (first, shift) = places.of(lane);
-            if !set_cube::<SIDE>(words, steps, first, bits_of::<SIDE>(&bits, lane), shift) {
-                left |= 1 << lane;
-            }
-            lanes &= lanes - 1;
+    fn columns<V: Simd>(&mut self, simd: V, columns: i32x16<V>, from: i32x16<V>, bits: i32x16<V>, lanes: Lanes) {
+        let lanes = mask32x16::from_bitmask(simd, lanes);
+        if self.columns.push(columns, from << MOST_BITS | bits, lanes) {
+            self.set_columns(simd);
         }
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize;
-            let (first, shift) = places.of(lane);
-            set_columns::<SIDE>(words, steps, first, bits_of::<SIDE>(&bits, lane), shift);
-            left &= left - 1;
+    }
+
+    #[inline(always)]
+    fn finish<V: Simd>(&mut self, simd: V) {
+        self.set_parts(simd);
+        self.set_columns(simd);
+    }
+}
+
+/// Where cubes are in a piece.
+pub(super) struct PlaceInWords<V: Simd> {
+    place: Place<V>,
+    /// The word and the shift of the low corner.
+    word: i32x16<V>,
+    shift: i32x16<V>,
+}
+
+impl CubeSink for SetRuns<'_> {
+    type Places<V: Simd> = PlaceInWords<V>;
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "where it may be, it is not used")]
+    fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> PlaceInWords<V> {
+        let place = self.place(low, base);
+        let word = place.column * self.slab.column_words as i32 + (place.z >> WORD_SHIFT);
+        let shift = place.z & (WORD_BITS as i32 - 1);
+        PlaceInWords { place, word, shift }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "words that fit")]
+    fn cubes<V: Simd, const SIDE: usize>(
+        &mut self,
+        simd: V,
+        places: &PlaceInWords<V>,
+        voxels: i32x16<V>,
+        lanes: Lanes,
+    ) {
+        let &PlaceInWords { ref place, word, shift } = places;
+        let none = i32x16::splat(simd, 0);
+        let in_a_word = shift.simd_le(WORD_BITS as i32 - SIDE as i32).to_bitmask();
+        let here = if self.slab.words.len() > MOST_WORDS { 0 } else { lanes & in_a_word };
+        if here != lanes {
+            self.cubes_as_columns::<V, SIDE>(simd, place, voxels, lanes & !here);
+        }
+        let here = mask32x16::from_bitmask(simd, here);
+        let voxels = here.select(voxels, none);
+        let [layer, beside] = [self.slab.layer() as i32, self.slab.column_words as i32];
+        for x in 0..SIDE {
+            for y in 0..SIDE {
+                let bits = bits_of_column::<V, SIDE>(voxels, x, y);
+                let word = word + (x as i32 * layer + y as i32 * beside);
+                if self.parts.push(word, bits << SHIFT_BITS | shift, bits.simd_gt(none)) {
+                    self.set_parts(simd);
+                }
+            }
         }
     }
 }
+
+/// Words of a slab whose numbers fit an `i32`; in tests, so few that some grids have more.
+const MOST_WORDS: usize = if cfg!(test) { 1 << 12 } else { i32::MAX as usize };
 
 /// Toggles the lowest voxel of a run; [`prefix_xor`] turns toggles into the parity of each voxel.
 pub(super) struct ToggleRuns<'a>(pub(super) Slab<'a>);

@@ -1,4 +1,4 @@
-//! Triangles whose box is at most four voxels along each axis: sixteen at a time, one a vector lane.
+//! Triangles whose box is at most three voxels along each axis: sixteen at a time, one a vector lane.
 //!
 //! First in f32 ([`filter`]). Where rounding may have decided a test, all are repeated in f64, in two halves of eight
 //! lanes. That is exact, as everything is integers below 2^53: corners are below 2^18 steps from the box's corner, edge
@@ -7,16 +7,13 @@
 
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, i64x8, mask32x16, prelude::*};
 
-use super::filter::{self, Cube, Filtered, Voxels};
+use super::filter::{self, Cube, Filtered};
 use super::kernel::NearClip;
 use super::octants;
 use super::rule::SurfaceRule;
 use super::sink::CubeSink;
-use super::triangles::{LANES, Lanes, Queue, Stored, Vectors};
+use super::triangles::{Lanes, Queue, Stored, Vectors};
 use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
-
-/// Lanes of a vector of f64.
-const HALF: usize = LANES / 2;
 
 /// S, the lattice steps of a voxel.
 const S: f64 = STEPS_PER_VOXEL as f64;
@@ -58,23 +55,19 @@ impl<V: Simd> Boxes<V> {
         layers
     }
 
-    /// Drops the voxels of cubes of `SIDE` that are outside the boxes or the clip.
+    /// Those of the voxels of cubes of `SIDE` that are inside the boxes and the clip.
     #[inline(always)]
-    fn keep<const SIDE: usize>(&self, simd: V, clip: &NearClip<V>, voxels: &mut Voxels<V>) {
+    fn keep<const SIDE: usize>(&self, simd: V, clip: &NearClip<V>, mut voxels: i32x16<V>) -> i32x16<V> {
         for axis in 0..3 {
-            let mut kept = [i32x16::splat(simd, 0); 2];
+            let mut kept = i32x16::splat(simd, 0);
             let from = clip.low[axis] - self.low[axis];
             let to = (clip.high[axis] - self.low[axis]).min(self.extent[axis]);
             for (i, bits) in (0..).zip(&Cube::<SIDE>::LAYERS[axis][..SIDE]) {
-                let inside = from.simd_le(i) & to.simd_ge(i);
-                for word in 0..Cube::<SIDE>::WORDS {
-                    kept[word] = inside.select(kept[word] | bits[word], kept[word]);
-                }
+                kept = (from.simd_le(i) & to.simd_ge(i)).select(kept | *bits, kept);
             }
-            for word in 0..Cube::<SIDE>::WORDS {
-                voxels[word] &= kept[word];
-            }
+            voxels &= kept;
         }
+        voxels
     }
 }
 
@@ -91,7 +84,7 @@ pub(super) fn send_boxes<V: Simd>(
     // The other end of the row is the cube's voxel 4, 2 or 1.
     let voxels = extent[0] << 4 | extent[1] << 2 | extent[2] << 1 | 1;
     let places = sink.places(low, clip.base);
-    sink.cubes::<_, 2>(&places, &[voxels, i32x16::splat(simd, 0)], mask);
+    sink.cubes::<_, 2>(simd, &places, voxels, mask);
 }
 
 /// Sends the voxels of the waiting triangles, whose boxes have at most `SIDE` voxels along each axis: of as many as fill
@@ -132,8 +125,7 @@ pub(super) fn send_cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
     if doubtful & lanes != 0 {
         voxels = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
     }
-    boxes.keep::<SIDE>(simd, clip, &mut voxels);
-    sink.cubes::<_, SIDE>(&places, &voxels, lanes);
+    sink.cubes::<_, SIDE>(simd, &places, boxes.keep::<SIDE>(simd, clip, voxels), lanes);
 }
 
 /// Sends the voxels of the triangles in `lanes`, whose boxes have at most two voxels along each axis.
@@ -151,7 +143,7 @@ pub(super) fn send_octants<V: Simd>(
     let middle = middles(&boxes.low, SIDE);
     let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
     let voxels = octants::voxels(simd, corners, middle, longest, PER_HALF, boxes.layers(clip), lanes);
-    sink.cubes::<_, SIDE>(&places, &[voxels, i32x16::splat(simd, 0)], lanes);
+    sink.cubes::<_, SIDE>(simd, &places, voxels, lanes);
 }
 
 /// [`send_octants`] of the waiting triangles: of as many as fill vectors, or of all.
@@ -192,7 +184,7 @@ pub(super) fn flush_flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
 
 /// [`flush_flats`] of the triangles in `lanes`.
 #[inline(always)]
-fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
+pub(super) fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
     rule: &R,
     corners: &Vectors<V>,
@@ -206,8 +198,7 @@ fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     if doubtful & lanes != 0 {
         voxels = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
     }
-    boxes.keep::<SIDE>(simd, clip, &mut voxels);
-    sink.cubes::<_, SIDE>(&places, &voxels, lanes);
+    sink.cubes::<_, SIDE>(simd, &places, boxes.keep::<SIDE>(simd, clip, voxels), lanes);
 }
 
 /// The voxels of cubes of `SIDE` that triangles meet whose boxes are one layer: of those inside the boxes. A row of voxels is
@@ -226,13 +217,13 @@ fn in_layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
     let turned = Vectors([layer.turned(v0), layer.turned(v1), layer.turned(v2)]);
     let v = turned.floats([middle(a, SIDE), middle(b, SIDE), middle(c, 1)], PER_HALF);
     let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
-    let Filtered { voxels: [cells, none], doubtful } = if R::TOUCH_IS_ENOUGH {
+    let Filtered { voxels: cells, doubtful } = if R::TOUCH_IS_ENOUGH {
         let v = [[v[0][0], v[0][1]], [v[1][0], v[1][1]], [v[2][0], v[2][1]]];
         filter::layers::<_, _, SIDE>(simd, rule, &v, longest)
     } else {
         filter::cuboids::<_, _, SIDE, SIDE, 1>(simd, rule, &v, longest)
     };
-    let voxels = if SIDE == 3 { [layer.spread_three(cells), none] } else { layer.spread_four(simd, cells) };
+    let voxels = if SIDE == 2 { layer.spread_two(cells) } else { layer.spread_three(cells) };
     Filtered { voxels, doubtful }
 }
 
@@ -245,7 +236,7 @@ fn middles<V: Simd>(low: &[i32x16<V>; 3], side: usize) -> [i32x16<V>; 3] {
 /// The middle of `side` voxels along an axis.
 #[inline(always)]
 fn middle<V: Simd>(low: i32x16<V>, side: usize) -> i32x16<V> {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "at most 4")]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "at most 3")]
     let half = side as i32 * (STEPS_PER_VOXEL / 2) as i32;
     (low << STEP_BITS) + half
 }
@@ -270,6 +261,14 @@ impl<V: Simd> Layer<V> {
         [across_x.select(p[1], p[0]), across_z.select(p[1], p[2]), across_x.select(p[0], across_z.select(p[2], p[1]))]
     }
 
+    /// Bit `2 a + b` of a layer of 2 x 2 voxels to the bit of its voxel in a cube.
+    #[inline(always)]
+    fn spread_two(&self, cells: i32x16<V>) -> i32x16<V> {
+        let rows = cells & 0b11 | (cells & 0b1100) << 2;
+        let bits = rows & 0b1_0001 | (rows & 0b10_0010) << 1;
+        self.across_x.select(cells, self.across_z.select(bits, rows))
+    }
+
     /// Bit `3 a + b` of a layer of 3 x 3 voxels to the bit of its voxel in a cube.
     #[inline(always)]
     fn spread_three(&self, cells: i32x16<V>) -> i32x16<V> {
@@ -278,48 +277,20 @@ impl<V: Simd> Layer<V> {
         let bits = rows & 0o001_001_001 | (rows & 0o002_002_002) << 2 | (rows & 0o004_004_004) << 4;
         self.across_x.select(cells, self.across_z.select(bits, rows))
     }
-
-    /// [`Self::spread_three`] for a layer of 4 x 4.
-    #[inline(always)]
-    fn spread_four(&self, simd: V, cells: i32x16<V>) -> Voxels<V> {
-        let (first, second) = (self.spread_two_rows(cells & 0xff), self.spread_two_rows(cells >> 8));
-        [self.across_x.select(cells, first), self.across_x.select(i32x16::splat(simd, 0), second)]
-    }
-
-    /// Two rows of a layer of 4 x 4 that is not across x to half of a cube.
-    #[inline(always)]
-    fn spread_two_rows(&self, cells: i32x16<V>) -> i32x16<V> {
-        // Each row's four bits to every 16th, each bit to every fourth.
-        let rows = cells & 0x0f | (cells & 0xf0) << 12;
-        let bits = (rows | rows << 6) & 0x0303_0303;
-        let bits = (bits | bits << 3) & 0x1111_1111;
-        self.across_z.select(bits, rows)
-    }
 }
 
 /// The voxels of cubes of `SIDE`, without rounding.
 #[inline(never)]
-fn exact_cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(simd: V, rule: &R, corners: &Stored) -> Voxels<V> {
+fn exact_cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(simd: V, rule: &R, corners: &Stored) -> i32x16<V> {
     simd.vectorize(
         #[inline(always)]
         || {
             let corners = corners.vectors(simd, 0);
             let boxes = Boxes::new(simd, &corners);
             let low = [boxes.low[0] << STEP_BITS, boxes.low[1] << STEP_BITS, boxes.low[2] << STEP_BITS];
-            let halves = corners.halves(simd, low, 1.0);
-            let mut words = [[0; LANES]; 2];
-            for half in 0..2 {
-                let mut lanes = [0; HALF];
-                exact::<_, _, SIDE>(simd, rule, &halves[half]).store_slice(&mut lanes);
-                for (lane, voxels) in lanes.into_iter().enumerate() {
-                    #[expect(clippy::cast_possible_truncation, reason = "the halves")]
-                    {
-                        words[0][HALF * half + lane] = voxels as i32;
-                        words[1][HALF * half + lane] = (voxels >> 32) as i32;
-                    }
-                }
-            }
-            [i32x16::from_slice(simd, &words[0]), i32x16::from_slice(simd, &words[1])]
+            let [first, second] = corners.halves(simd, low, 1.0);
+            let (first, second) = (exact::<_, _, SIDE>(simd, rule, &first), exact::<_, _, SIDE>(simd, rule, &second));
+            first.narrow(second)
         },
     )
 }
@@ -380,10 +351,9 @@ fn projected<V: Simd, R: SurfaceRule, const SIDE: usize>(
     let mut voxels = i64x8::splat(simd, 0);
     for row in &Cube::<SIDE>::CELLS[axis][..SIDE] {
         let mut here = at;
-        for &[low, high] in &row[..SIDE] {
+        for &shown in &row[..SIDE] {
             let passing = here[0].min(here[1]).min(here[2]).simd_ge(zero);
-            let shown = i64::from(low.cast_unsigned()) | i64::from(high) << 32;
-            voxels = passing.select(voxels | shown, voxels);
+            voxels = passing.select(voxels | i64::from(shown), voxels);
             for k in 0..3 {
                 here[k] += step_b[k];
             }
@@ -419,8 +389,11 @@ mod tests {
     use super::*;
     use crate::conformance::random::{Placement, Random, triangle};
     use crate::cpu::rule::{Conservative, Thin};
+    use crate::cpu::triangles::LANES;
 
     const ROUNDS: u32 = 500;
+    /// Lanes of a vector of f64.
+    const HALF: usize = LANES / 2;
 
     /// Triangles whose boxes are inside a cube of `side` voxels at the origin: corner, axis, lane.
     fn in_cube(random: &mut Random, round: u32, side: i64) -> [[[i32; LANES]; 3]; 3] {
@@ -443,12 +416,6 @@ mod tests {
         Vectors(rows.map(|corner| corner.map(|row| i32x16::from_slice(simd, &row))))
     }
 
-    /// The voxels of each lane.
-    fn by_lane<V: Simd>(voxels: &Voxels<V>) -> [u64; LANES] {
-        let word = |i: usize, lane: usize| u64::from(voxels[i][lane].cast_unsigned());
-        std::array::from_fn(|lane| word(0, lane) | word(1, lane) << 32)
-    }
-
     /// The share of triangles that the filter decides, all of them as the exact tests do.
     fn decided<V: Simd, R: SurfaceRule, const SIDE: usize>(simd: V, rule: &R) -> f64 {
         let mut random = Random::new(SIDE as u64);
@@ -464,14 +431,14 @@ mod tests {
                 &corners.floats(middles(&low, SIDE), PER_HALF),
                 longest,
             );
-            let voxels = by_lane(&filtered.voxels);
+            let voxels = filtered.voxels;
             for (half, corners) in corners.halves(simd, low, 1.0).iter().enumerate() {
                 let mut exact_bits = [0; HALF];
                 exact::<_, _, SIDE>(simd, rule, corners).store_slice(&mut exact_bits);
                 for (lane, exact) in (HALF * half..).zip(exact_bits) {
                     if filtered.doubtful >> lane & 1 == 0 {
                         let corners = rows.map(|corner| corner.map(|row| row[lane]));
-                        assert_eq!(voxels[lane], exact.cast_unsigned(), "side {SIDE}, round {round}, {corners:?}");
+                        assert_eq!(i64::from(voxels[lane]), exact, "side {SIDE}, round {round}, {corners:?}");
                         decided += 1;
                     }
                 }
@@ -498,13 +465,11 @@ mod tests {
             }
             let corners = vectors(simd, &rows);
             let boxes = Boxes::new(simd, &corners);
-            let mut exact = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
-            let Filtered { mut voxels, doubtful } = in_layers::<_, _, SIDE>(simd, rule, &corners, &boxes);
+            let exact = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
+            let Filtered { voxels, doubtful } = in_layers::<_, _, SIDE>(simd, rule, &corners, &boxes);
             let all = i32x16::splat(simd, i32::try_from(SIDE).unwrap());
             let clip = NearClip { base: [0; 3], low: [i32x16::splat(simd, 0); 3], high: [all; 3] };
-            boxes.keep::<SIDE>(simd, &clip, &mut exact);
-            boxes.keep::<SIDE>(simd, &clip, &mut voxels);
-            let (exact, voxels) = (by_lane(&exact), by_lane(&voxels));
+            let [exact, voxels] = [exact, voxels].map(|voxels| boxes.keep::<SIDE>(simd, &clip, voxels));
             for lane in (0..LANES).filter(|lane| doubtful >> lane & 1 == 0) {
                 let corners = rows.map(|corner| corner.map(|row| row[lane]));
                 assert_eq!(voxels[lane], exact[lane], "side {SIDE}, round {round}, {corners:?}");
@@ -551,8 +516,8 @@ mod tests {
             let mut clip = || i32x16::splat(simd, i32::try_from(random.range(0, 1)).unwrap());
             let (zero, one) = (i32x16::splat(simd, 0), i32x16::splat(simd, 1));
             let clip = NearClip { base: [0; 3], low: [clip(), zero, zero], high: [one, clip(), one] };
-            let mut expected = exact_cubes::<_, _, 2>(simd, &Conservative, &corners.stored());
-            boxes.keep::<2>(simd, &clip, &mut expected);
+            let expected = exact_cubes::<_, _, 2>(simd, &Conservative, &corners.stored());
+            let expected = boxes.keep::<2>(simd, &clip, expected);
 
             let (middle, layers) = (middles(&boxes.low, 2), boxes.layers(&clip));
             let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
@@ -562,7 +527,7 @@ mod tests {
                 let corners_of = rows.map(|corner| corner.map(|row| row[lane]));
                 // Alone, so that the others' doubts do not matter.
                 let alone = octants::voxels(simd, &corners, middle, longest, PER_HALF, layers, 1 << lane);
-                assert_eq!([exact[lane], alone[lane]], [expected[0][lane]; 2], "round {round}, {corners_of:?}");
+                assert_eq!([exact[lane], alone[lane]], [expected[lane]; 2], "round {round}, {corners_of:?}");
             }
         }
     }
@@ -577,14 +542,11 @@ mod tests {
         let shares = fearless_simd::dispatch!(fearless_simd::Level::new(), simd => [
             decided::<_, _, 2>(simd, &Conservative),
             decided::<_, _, 3>(simd, &Conservative),
-            decided::<_, _, 4>(simd, &Conservative),
             decided::<_, _, 2>(simd, &Thin),
             decided::<_, _, 3>(simd, &Thin),
-            decided::<_, _, 4>(simd, &Thin),
             decided_in_layers::<_, _, 3>(simd, &Conservative),
-            decided_in_layers::<_, _, 4>(simd, &Conservative),
+            decided_in_layers::<_, _, 2>(simd, &Thin),
             decided_in_layers::<_, _, 3>(simd, &Thin),
-            decided_in_layers::<_, _, 4>(simd, &Thin),
         ]);
         // Of five placements, one has no ties and the others little else.
         assert!(shares.iter().all(|share| (0.15..0.9).contains(share)), "{shares:?}");
