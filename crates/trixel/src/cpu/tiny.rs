@@ -55,17 +55,22 @@ impl<V: Simd> Boxes<V> {
         layers
     }
 
-    /// Those of the voxels of cubes of `SIDE` that are inside the boxes and the clip.
+    /// Those of the voxels of cubes of `SIDE` that are inside the boxes and the clip, where boxes meet it.
     #[inline(always)]
-    fn keep<const SIDE: usize>(&self, simd: V, clip: &NearClip<V>, mut voxels: i32x16<V>) -> i32x16<V> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "at most 3")]
+    fn keep<const SIDE: usize>(&self, clip: &NearClip<V>, mut voxels: i32x16<V>) -> i32x16<V> {
         for axis in 0..3 {
-            let mut kept = i32x16::splat(simd, 0);
             let from = clip.low[axis] - self.low[axis];
             let to = (clip.high[axis] - self.low[axis]).min(self.extent[axis]);
-            for (i, bits) in (0..).zip(&Cube::<SIDE>::LAYERS[axis][..SIDE]) {
-                kept = (from.simd_le(i) & to.simd_ge(i)).select(kept | *bits, kept);
+            for (i, &layer) in (0..).zip(&Cube::<SIDE>::LAYERS[axis][..SIDE]) {
+                // The last layer is not before all that is inside, nor the first behind it.
+                if i + 1 < SIDE as i32 {
+                    voxels = from.simd_gt(i).select(voxels & !layer, voxels);
+                }
+                if i > 0 {
+                    voxels = to.simd_lt(i).select(voxels & !layer, voxels);
+                }
             }
-            voxels &= kept;
         }
         voxels
     }
@@ -125,7 +130,7 @@ pub(super) fn send_cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
     if doubtful & lanes != 0 {
         voxels = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
     }
-    sink.cubes::<_, SIDE>(simd, &places, boxes.keep::<SIDE>(simd, clip, voxels), lanes);
+    sink.cubes::<_, SIDE>(simd, &places, boxes.keep::<SIDE>(clip, voxels), lanes);
 }
 
 /// Sends the voxels of the triangles in `lanes`, whose boxes have at most two voxels along each axis.
@@ -198,7 +203,7 @@ pub(super) fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     if doubtful & lanes != 0 {
         voxels = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
     }
-    sink.cubes::<_, SIDE>(simd, &places, boxes.keep::<SIDE>(simd, clip, voxels), lanes);
+    sink.cubes::<_, SIDE>(simd, &places, boxes.keep::<SIDE>(clip, voxels), lanes);
 }
 
 /// The voxels of cubes of `SIDE` that triangles meet whose boxes are one layer: of those inside the boxes. A row of voxels is
@@ -469,7 +474,7 @@ mod tests {
             let Filtered { voxels, doubtful } = in_layers::<_, _, SIDE>(simd, rule, &corners, &boxes);
             let all = i32x16::splat(simd, i32::try_from(SIDE).unwrap());
             let clip = NearClip { base: [0; 3], low: [i32x16::splat(simd, 0); 3], high: [all; 3] };
-            let [exact, voxels] = [exact, voxels].map(|voxels| boxes.keep::<SIDE>(simd, &clip, voxels));
+            let [exact, voxels] = [exact, voxels].map(|voxels| boxes.keep::<SIDE>(&clip, voxels));
             for lane in (0..LANES).filter(|lane| doubtful >> lane & 1 == 0) {
                 let corners = rows.map(|corner| corner.map(|row| row[lane]));
                 assert_eq!(voxels[lane], exact[lane], "side {SIDE}, round {round}, {corners:?}");
@@ -517,7 +522,7 @@ mod tests {
             let (zero, one) = (i32x16::splat(simd, 0), i32x16::splat(simd, 1));
             let clip = NearClip { base: [0; 3], low: [clip(), zero, zero], high: [one, clip(), one] };
             let expected = exact_cubes::<_, _, 2>(simd, &Conservative, &corners.stored());
-            let expected = boxes.keep::<2>(simd, &clip, expected);
+            let expected = boxes.keep::<2>(&clip, expected);
 
             let (middle, layers) = (middles(&boxes.low, 2), boxes.layers(&clip));
             let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
