@@ -1,11 +1,12 @@
 //! The tests of triangles of a few voxels in f32, sixteen triangles at a time, and which of them rounding may have decided.
 //!
 //! Half a voxel is the unit, and the middle of a cuboid of voxels the origin, so that voxels' centres are whole numbers `p`
-//! with `|p| < D`, for `D` voxels along an axis, and corners are exact, with `|v| <= D <= 4`. Let `m` be the longest side of
+//! with `|p| < D`, for `D` voxels along an axis, and corners are exact, with `|v| <= D <= 3`. Let `m` be the longest side of
 //! a triangle's box and `u = 2^-24` the most by which a sum or product of floats is off, relative to it.
 //!
 //! - Edges `e` are exact, with `|e| <= m`. A component of the normal, `p - q` of two products, is off by at most
-//!   `u (|p| + |q| + |p - q|)`, so that its sign is right from `8 u (|p| + |q|)` on.
+//!   `u (|p| + |q| + |p - q|)`, so that its sign is right from `8 u (|p| + |q|)` on; where
+//!   products and sums are fused, it can be found with the right sign always ([`determinant`]).
 //! - An edge function is `e x v + reach + e x p`, of which only sums and products of two are rounded: off by less than
 //!   `64 u m`.
 //! - The plane's term, `N . v + N . p` against its reach, is off by less than `256 u m^2`.
@@ -163,7 +164,7 @@ impl<V: Simd> Normal<V> {
         Self { least: f32x16::splat(simd, f32::MAX) }
     }
 
-    /// The component across the axes i and j: off by at most `3 u` times the larger of its products.
+    /// The component across the axes i and j: a difference of two products.
     #[inline(always)]
     pub(super) fn across<const AXES: usize>(&mut self, e: &[[f32x16<V>; AXES]; 3], i: usize, j: usize) -> f32x16<V> {
         let (p, q) = (e[0][i] * e[1][j], e[0][j] * e[1][i]);
@@ -288,12 +289,12 @@ impl<V: Simd> Tests<V> {
 
 /// `a_i b_j - a_j b_i`, where `mul_sub` rounds once: of the right sign, and 0 only if it is 0 (Kahan's algorithm).
 #[inline(always)]
-pub(super) fn determinant<V: Simd, F: SimdFloat<V>, const AXES: usize>(
-    a: [F; AXES],
-    b: [F; AXES],
+fn determinant<V: Simd, const AXES: usize>(
+    a: [f32x16<V>; AXES],
+    b: [f32x16<V>; AXES],
     i: usize,
     j: usize,
-) -> F {
+) -> f32x16<V> {
     let product = a[j] * b[i];
     let lost = a[j].mul_sub(b[i], product);
     a[i].mul_sub(b[j], product) - lost

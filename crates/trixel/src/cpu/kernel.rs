@@ -90,7 +90,7 @@ pub(super) fn surface<'a, V: Simd, R: SurfaceRule, S: CubeSink>(
     sink: &mut S,
 ) {
     let mut others = Others::default();
-    let (mut waiting, mut columns) = (Waiting::new(), Columns::new());
+    let (mut waiting, mut columns) = (TinyQueues::new(), Columns::new());
     let base = base(mesh, clip);
     let near = NearClip::new(simd, clip, base);
     for_each_vector(
@@ -404,14 +404,14 @@ impl<V: Simd> NearClip<V> {
 }
 
 /// The tiny triangles that wait, by the size of their boxes.
-struct Waiting {
+struct TinyQueues {
     twos: Queue,
     threes: Queue,
     /// At most three voxels along two axes, and one along the third.
     flat_threes: Queue,
 }
 
-impl Waiting {
+impl TinyQueues {
     fn new() -> Self {
         const NONE: Queue = Queue::EMPTY;
         Self { twos: NONE, threes: NONE, flat_threes: NONE }

@@ -1,7 +1,7 @@
 //! The CPU backend.
 //!
 //! - `kernel`: one triangle after the other, each to the path for its size
-//! - `tiny`, `crossings`, `rows`, `large`: the paths
+//! - `tiny`, `columns`, `crossings`, `rows`, `large`: the paths
 //! - `octants`: the tests of `tiny` for the smallest
 //! - `filter`: its tests for all others in f32, and where they need to be repeated exactly
 //! - `instructions`: the vector instructions they are compiled for

@@ -303,7 +303,7 @@ fn set_columns<const SIDE: usize>(words: &mut [u64], steps: Steps, first: isize,
 }
 
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "at most 4")]
+#[expect(clippy::cast_possible_truncation, reason = "at most 3")]
 const fn side<const SIDE: usize>() -> u32 {
     SIDE as u32
 }
@@ -321,7 +321,9 @@ impl ColumnSink for Outbox<'_> {
     }
 
     /// There are none: triangles with more than small cubes are left.
-    fn columns<V: Simd>(&mut self, _simd: V, _at: i32x16<V>, _from: i32x16<V>, _bits: i32x16<V>, _lanes: Lanes) {}
+    fn columns<V: Simd>(&mut self, _simd: V, _at: i32x16<V>, _from: i32x16<V>, _bits: i32x16<V>, lanes: Lanes) {
+        debug_assert_eq!(lanes, 0, "triangles of columns are left");
+    }
 
     fn finish<V: Simd>(&mut self, _simd: V) {}
 }

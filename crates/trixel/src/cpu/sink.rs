@@ -67,7 +67,7 @@ pub(super) trait CubeSink: ColumnSink {
     type Places<V: Simd>;
 
     /// Looks up cubes whose low corners are seen from the voxel `base`, and inside the clip along z: long before they are
-    /// sent, because vectors take their time to be read lane by lane.
+    /// sent, because where vectors are read lane by lane, they take their time.
     fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> Self::Places<V>;
 
     /// Voxels of cubes of `SIDE` in `lanes`: those `(x, y, z)` from the corner whose bit `(SIDE x + y) SIDE + z` is set, all
@@ -159,30 +159,28 @@ impl<'a> Slab<'a> {
 /// Sets the voxels of a run.
 pub(super) struct SetRuns<'a> {
     slab: Slab<'a>,
-    /// Words, and bits above their shift, in [`SHIFT_BITS`].
-    parts: Waiting,
-    /// Columns, and bits of which the lowest voxel is above them, from [`MOST_BITS`] on.
-    columns: Waiting,
+    /// Words, and bits above their shift, which has [`WORD_SHIFT`] bits.
+    in_words: Parts,
+    /// Columns' numbers, and bits, below the lowest's voxel, which is from [`MOST_BITS`] on.
+    in_columns: Parts,
 }
 
 /// Parts of columns that wait, so that the loop that sets them is long.
-struct Waiting {
+struct Parts {
     count: usize,
-    places: [i32; MOST_WAITING],
-    bits: [i32; MOST_WAITING],
+    places: [i32; MOST_PARTS],
+    bits: [i32; MOST_PARTS],
 }
 
-/// Waiting parts from which on they are set.
+/// Parts parts that are not yet set.
 const FULL: usize = 256;
-const MOST_WAITING: usize = FULL + LANES;
+const MOST_PARTS: usize = FULL + LANES;
 
-/// Bits of a shift.
-const SHIFT_BITS: u32 = WORD_SHIFT;
 /// Voxels of a part of a column at most.
 pub(super) const MOST_BITS: u32 = 16;
 
-impl Waiting {
-    const NONE: Self = Self { count: 0, places: [0; MOST_WAITING], bits: [0; MOST_WAITING] };
+impl Parts {
+    const NONE: Self = Self { count: 0, places: [0; MOST_PARTS], bits: [0; MOST_PARTS] };
 
     /// Adds those in `lanes`; `true` when they are to be set before the next.
     #[inline(always)]
@@ -198,7 +196,7 @@ impl Waiting {
     #[inline(always)]
     #[expect(clippy::cast_sign_loss, reason = "never below 0")]
     fn take(&mut self) -> impl Iterator<Item = (usize, u32)> {
-        let count = self.count.min(MOST_WAITING);
+        let count = self.count.min(MOST_PARTS);
         self.count = 0;
         self.places[..count].iter().zip(&self.bits[..count]).map(|(&place, &bits)| (place as usize, bits as u32))
     }
@@ -206,18 +204,18 @@ impl Waiting {
 
 impl<'a> SetRuns<'a> {
     pub(super) fn new(slab: Slab<'a>) -> Self {
-        Self { slab, parts: Waiting::NONE, columns: Waiting::NONE }
+        Self { slab, in_words: Parts::NONE, in_columns: Parts::NONE }
     }
 
     /// Sets the parts that wait.
     #[inline(never)]
-    fn set_parts<V: Simd>(&mut self, simd: V) {
+    fn set_in_words<V: Simd>(&mut self, simd: V) {
         simd.vectorize(
             #[inline(always)]
             || {
                 let words = &mut *self.slab.words;
-                for (word, bits) in self.parts.take() {
-                    words[word] |= u64::from(bits >> SHIFT_BITS) << (bits % WORD_BITS);
+                for (word, bits) in self.in_words.take() {
+                    words[word] |= u64::from(bits >> WORD_SHIFT) << (bits % WORD_BITS);
                 }
             },
         );
@@ -225,12 +223,12 @@ impl<'a> SetRuns<'a> {
 
     /// Sets the columns that wait.
     #[inline(never)]
-    fn set_columns<V: Simd>(&mut self, simd: V) {
+    fn set_in_columns<V: Simd>(&mut self, simd: V) {
         simd.vectorize(
             #[inline(always)]
             || {
                 let Slab { words, column_words, .. } = &mut self.slab;
-                for (column, bits) in self.columns.take() {
+                for (column, bits) in self.in_columns.take() {
                     let (from, bits) = (bits >> MOST_BITS, u64::from(bits % (1 << MOST_BITS)));
                     let word = column * *column_words + (from / WORD_BITS) as usize;
                     words[word] |= bits << (from % WORD_BITS);
@@ -245,7 +243,7 @@ impl<'a> SetRuns<'a> {
 
     /// Cubes, as columns.
     #[inline(never)]
-    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "at most 64")]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "at most 24")]
     fn cubes_as_columns<V: Simd, const SIDE: usize>(
         &mut self,
         simd: V,
@@ -271,7 +269,7 @@ impl<'a> SetRuns<'a> {
 
 /// The bits of a column of cubes of `SIDE`.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "at most 64")]
+#[expect(clippy::cast_possible_truncation, reason = "at most 24")]
 fn bits_of_column<V: Simd, const SIDE: usize>(voxels: i32x16<V>, x: usize, y: usize) -> i32x16<V> {
     voxels >> ((SIDE * x + y) * SIDE) as u32 & ((1 << SIDE) - 1)
 }
@@ -372,15 +370,15 @@ impl ColumnSink for SetRuns<'_> {
     #[inline(always)]
     fn columns<V: Simd>(&mut self, simd: V, columns: i32x16<V>, from: i32x16<V>, bits: i32x16<V>, lanes: Lanes) {
         let lanes = mask32x16::from_bitmask(simd, lanes);
-        if self.columns.push(columns, from << MOST_BITS | bits, lanes) {
-            self.set_columns(simd);
+        if self.in_columns.push(columns, from << MOST_BITS | bits, lanes) {
+            self.set_in_columns(simd);
         }
     }
 
     #[inline(always)]
     fn finish<V: Simd>(&mut self, simd: V) {
-        self.set_parts(simd);
-        self.set_columns(simd);
+        self.set_in_words(simd);
+        self.set_in_columns(simd);
     }
 }
 
@@ -427,8 +425,8 @@ impl CubeSink for SetRuns<'_> {
             for y in 0..SIDE {
                 let bits = bits_of_column::<V, SIDE>(voxels, x, y);
                 let word = word + (x as i32 * layer + y as i32 * beside);
-                if self.parts.push(word, bits << SHIFT_BITS | shift, bits.simd_gt(none)) {
-                    self.set_parts(simd);
+                if self.in_words.push(word, bits << WORD_SHIFT | shift, bits.simd_gt(none)) {
+                    self.set_in_words(simd);
                 }
             }
         }
