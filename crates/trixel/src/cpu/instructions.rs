@@ -43,3 +43,9 @@ pub(super) fn fuses<V: Simd>(simd: V) -> bool {
     #[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
     false
 }
+
+/// Whether `compress` is quicker than moving lanes one by one: measured on x86, and not elsewhere.
+#[inline(always)]
+pub(super) fn compresses<V: Simd>(simd: V) -> bool {
+    cfg!(any(target_arch = "x86", target_arch = "x86_64")) && fuses(simd)
+}

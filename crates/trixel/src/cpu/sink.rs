@@ -2,6 +2,8 @@
 
 use fearless_simd::{Simd, i32x16, i64x8, mask32x16, prelude::*};
 
+use super::instructions::compresses;
+use super::kernel::set_bits;
 use super::prefetch::{self, prefetch};
 use super::rows::Tile;
 use super::triangles::{LANES, Lanes};
@@ -184,11 +186,21 @@ impl Parts {
 
     /// Adds those in `lanes`; `true` when they are to be set before the next.
     #[inline(always)]
-    fn push<V: Simd>(&mut self, places: i32x16<V>, bits: i32x16<V>, lanes: mask32x16<V>) -> bool {
-        let at = self.count.min(FULL);
-        places.compress(lanes).store_slice(&mut self.places[at..at + LANES]);
-        bits.compress(lanes).store_slice(&mut self.bits[at..at + LANES]);
-        self.count = at + lanes.to_bitmask().count_ones() as usize;
+    fn push<V: Simd>(&mut self, simd: V, places: i32x16<V>, bits: i32x16<V>, lanes: mask32x16<V>) -> bool {
+        let mut at = self.count.min(FULL);
+        if compresses(simd) {
+            places.compress(lanes).store_slice(&mut self.places[at..at + LANES]);
+            bits.compress(lanes).store_slice(&mut self.bits[at..at + LANES]);
+            at += lanes.to_bitmask().count_ones() as usize;
+        } else {
+            let (places, bits) = (*places, *bits);
+            for lane in set_bits(lanes.to_bitmask()) {
+                let at_most = at.min(MOST_PARTS - 1);
+                (self.places[at_most], self.bits[at_most]) = (places[lane % LANES], bits[lane % LANES]);
+                at += 1;
+            }
+        }
+        self.count = at;
         self.count > FULL
     }
 
@@ -370,7 +382,7 @@ impl ColumnSink for SetRuns<'_> {
     #[inline(always)]
     fn columns<V: Simd>(&mut self, simd: V, columns: i32x16<V>, from: i32x16<V>, bits: i32x16<V>, lanes: Lanes) {
         let lanes = mask32x16::from_bitmask(simd, lanes);
-        if self.in_columns.push(columns, from << MOST_BITS | bits, lanes) {
+        if self.in_columns.push(simd, columns, from << MOST_BITS | bits, lanes) {
             self.set_in_columns(simd);
         }
     }
@@ -425,7 +437,7 @@ impl CubeSink for SetRuns<'_> {
             for y in 0..SIDE {
                 let bits = bits_of_column::<V, SIDE>(voxels, x, y);
                 let word = word + (x as i32 * layer + y as i32 * beside);
-                if self.in_words.push(word, bits << WORD_SHIFT | shift, bits.simd_gt(none)) {
+                if self.in_words.push(simd, word, bits << WORD_SHIFT | shift, bits.simd_gt(none)) {
                     self.set_in_words(simd);
                 }
             }
