@@ -21,7 +21,7 @@
 
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
 
-use super::filter::{Normal, between};
+use super::filter::{Normal, UNIT, between};
 use super::kernel::NearClip;
 use super::rows::{Rows, exchange};
 use super::rule::SurfaceRule;
@@ -29,7 +29,6 @@ use super::sink::{ColumnSink, MOST_BITS};
 use super::triangles::{LANES, Lanes, Queue, Vectors};
 use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
 
-const UNIT: f32 = 1.0 / (1 << 24) as f32;
 /// A share of an edge's length and of the longest side and two voxels by which an edge function may be off.
 const EDGE_ERROR: f32 = 64.0 * UNIT;
 /// A share of the square of the longest side, and of it and two voxels, by which the plane's term may be off.
@@ -132,10 +131,10 @@ impl Columns {
     }
 }
 
-/// Bounds of z in floats: `-z` and `z` are at most what they surely may be, and what they surely are.
+/// Bounds of `-z` and of `z`: what exceeds one of these is outside, and what exceeds none of those for sure is inside,
+/// whatever was rounded.
 #[derive(Clone, Copy)]
 struct Bounds<V: Simd> {
-    /// Of `-z`: at most this, whatever was rounded.
     below: f32x16<V>,
     below_surely: f32x16<V>,
     above: f32x16<V>,
@@ -320,11 +319,11 @@ fn send<V: Simd, R: SurfaceRule>(
     }
     let (bottom, top) = (-first[2].to_float::<f32x16<V>>(), last[2].to_float::<f32x16<V>>());
     for a in 0..MOST[1] {
-        let in_row = last[0].simd_ge(a) & first[0].simd_le(a);
-        let in_row_lanes = in_row.to_bitmask() & lanes;
-        if last[0].simd_ge(a).to_bitmask() & lanes == 0 {
+        let not_past = last[0].simd_ge(a).to_bitmask() & lanes;
+        if not_past == 0 {
             break;
         }
+        let in_row = not_past & first[0].simd_le(a).to_bitmask();
         let mut by_short = Bounds { below: bottom, below_surely: bottom, above: top, above_surely: top };
         for edge in &short {
             edge.apply(a as f32, &mut by_short);
@@ -336,7 +335,7 @@ fn send<V: Simd, R: SurfaceRule>(
         let height = slope[0].mul_add(a as f32, at_origin);
         let mut column = at.column + steps[0] * a;
         for b in 0..=last_b {
-            let here = in_row_lanes & (last[1].simd_ge(b as i32) & first[1].simd_le(b as i32)).to_bitmask();
+            let here = in_row & (last[1].simd_ge(b as i32) & first[1].simd_le(b as i32)).to_bitmask();
             let i = b as f32;
             let least = xy[0][2].mul_add(i, row[0]).min(xy[1][2].mul_add(i, row[1])).min(xy[2][2].mul_add(i, row[2]));
             let height = slope[1].mul_add(i, height);

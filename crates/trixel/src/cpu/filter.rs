@@ -5,8 +5,8 @@
 //! a triangle's box and `u = 2^-24` the most by which a sum or product of floats is off, relative to it.
 //!
 //! - Edges `e` are exact, with `|e| <= m`. A component of the normal, `p - q` of two products, is off by at most
-//!   `u (|p| + |q| + |p - q|)`, so that its sign is right from `8 u (|p| + |q|)` on; where
-//!   products and sums are fused, it can be found with the right sign always ([`determinant`]).
+//!   `u (|p| + |q| + |p - q|)`, so that its sign is right from `8 u (|p| + |q|)` on; where products and
+//!   sums are fused, it can be found with the right sign always ([`determinant`]).
 //! - An edge function is `e x v + reach + e x p`, of which only sums and products of two are rounded: off by less than
 //!   `64 u m`.
 //! - The plane's term, `N . v + N . p` against its reach, is off by less than `256 u m^2`.
@@ -34,7 +34,8 @@ const EDGE_DOUBT: f32 = 64.0 * UNIT;
 const PLANE_DOUBT: f32 = 256.0 * UNIT;
 /// A share of its products by which a component of the normal may be off.
 const NORMAL_DOUBT: f32 = 8.0 * UNIT;
-const UNIT: f32 = 1.0 / (1 << 24) as f32;
+/// The most by which a sum or product is off, relative to it.
+pub(super) const UNIT: f32 = 1.0 / (1 << 24) as f32;
 
 /// Constants for cuboids of `A` by `B` by `C` voxels.
 pub(super) struct Cuboid<const A: usize, const B: usize, const C: usize>;

@@ -161,9 +161,9 @@ impl<'a> Slab<'a> {
 /// Sets the voxels of a run.
 pub(super) struct SetRuns<'a> {
     slab: Slab<'a>,
-    /// Words, and bits above their shift, which has [`WORD_SHIFT`] bits.
+    /// By the number of a word: the bits' shift in it, in [`WORD_SHIFT`] bits, and above it the bits.
     in_words: Parts,
-    /// Columns' numbers, and bits, below the lowest's voxel, which is from [`MOST_BITS`] on.
+    /// By the number of a column: the bits, in [`MOST_BITS`] bits, and above them the voxel of the lowest.
     in_columns: Parts,
 }
 
@@ -174,7 +174,7 @@ struct Parts {
     bits: [i32; MOST_PARTS],
 }
 
-/// Parts parts that are not yet set.
+/// Parts that may wait before all are set.
 const FULL: usize = 256;
 const MOST_PARTS: usize = FULL + LANES;
 
