@@ -22,6 +22,7 @@
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
 
 use super::filter::{Normal, UNIT, between};
+use super::instructions::fuses;
 use super::kernel::NearClip;
 use super::rows::{Rows, exchange};
 use super::rule::SurfaceRule;
@@ -40,9 +41,9 @@ const FAR: f32 = 1e9;
 
 /// Triangles whose boxes are of at most so many columns along the longer and along the shorter side go together, because all
 /// of a vector take as long as the largest.
-const SIZES: [[i32; 2]; 4] = [[2, 2], [4, 4], [8, 4], MOST];
-const MOST: [i32; 2] = [16, 8];
-const MOST_LONG: usize = MOST[0].unsigned_abs() as usize;
+const SIZES: [[i32; 2]; 5] = [[2, 2], [4, 4], [8, 4], [16, 8], [32, 2]];
+const MOST_LONG: usize = 32;
+const MOST_SHORT: i32 = 8;
 /// Voxels of a column at most.
 const MOST_HIGH: i32 = MOST_BITS.cast_signed();
 
@@ -182,11 +183,13 @@ impl<V: Simd> EdgeBound<V> {
     /// Of an edge with the inward normal `(n_i, n_z)`, at `(v_i, v_z)`, that reaches `reach` beyond the edge.
     #[inline(always)]
     fn new(simd: V, n: [f32x16<V>; 2], v: [f32x16<V>; 2], reach: f32x16<V>, share: f32x16<V>) -> Self {
-        let zero = f32x16::splat(simd, 0.0);
+        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
         let error = (n[0].abs() + n[1].abs()) * share;
         let at_origin = (-n[0]).mul_add(v[0], (-n[1]).mul_add(v[1], reach));
-        let n_z = n[1].simd_eq(zero).select(f32x16::splat(simd, NO_PART), n[1]);
-        let per_z = f32x16::splat(simd, 1.0) / n_z.abs();
+        let along_axis = n[0].abs().min(n[1].abs()).simd_eq(zero);
+        let at_origin = along_axis.select(f32x16::splat(simd, FAR), at_origin);
+        let n_z = along_axis.select(one, n[1]);
+        let per_z = one / n_z.abs();
         Self {
             start: (at_origin + error) * per_z,
             step: n[0] * per_z,
@@ -272,9 +275,9 @@ fn send<V: Simd, R: SurfaceRule>(
     for k in 0..3 {
         let (na, nb) = (-(e[k][1] * side), e[k][0] * side);
         let reach = rule.centre_reach(lengths[k][1], lengths[k][0]) * 0.5;
-        let point = (lengths[k][0] + lengths[k][1]).simd_eq(zero);
+        let along_axis = lengths[k][0].min(lengths[k][1]).simd_eq(zero);
         let at_origin = (-na).mul_add(v[k][0], (-nb).mul_add(v[k][1], reach));
-        xy[k] = [point.select(f32x16::splat(simd, FAR), at_origin), na, nb];
+        xy[k] = [along_axis.select(f32x16::splat(simd, FAR), at_origin), na, nb];
     }
     // The projections to yz and zx.
     let side = one.copysign(n[0]);
@@ -296,7 +299,12 @@ fn send<V: Simd, R: SurfaceRule>(
     let n_z = n[2].abs().max(f32x16::splat(simd, NO_PART));
     let per_z = one / n_z;
     let reach = rule.centre_plane_reach([n[0].abs(), n[1].abs(), n[2].abs()]) * 0.5;
-    let error = longest * longest * near * PLANE_ERROR;
+    let error = if fuses(simd) {
+        let all = n[0].abs() + n[1].abs() + n[2].abs();
+        (all * near * (PLANE_ERROR * 0.5)).max(f32x16::splat(simd, 1e-20))
+    } else {
+        longest * longest * near * PLANE_ERROR
+    };
     let (thick, thick_surely) = ((reach + error) * per_z, (reach - error) * per_z);
     let slope = [n[0] * up * per_z, n[1] * up * per_z];
     let at_origin = -(n[0].mul_add(v[0][0], n[1].mul_add(v[0][1], n[2] * v[0][2])) * up * per_z);
@@ -318,7 +326,7 @@ fn send<V: Simd, R: SurfaceRule>(
         bounds.store(&mut by_long[b]);
     }
     let (bottom, top) = (-first[2].to_float::<f32x16<V>>(), last[2].to_float::<f32x16<V>>());
-    for a in 0..MOST[1] {
+    for a in 0..MOST_SHORT {
         let not_past = last[0].simd_ge(a).to_bitmask() & lanes;
         if not_past == 0 {
             break;

@@ -34,6 +34,8 @@ const EDGE_DOUBT: f32 = 64.0 * UNIT;
 const PLANE_DOUBT: f32 = 256.0 * UNIT;
 /// A share of its products by which a component of the normal may be off.
 const NORMAL_DOUBT: f32 = 8.0 * UNIT;
+/// Beyond any voxel.
+const FAR: f32 = 1e9;
 /// The most by which a sum or product is off, relative to it.
 pub(super) const UNIT: f32 = 1.0 / (1 << 24) as f32;
 
@@ -89,7 +91,7 @@ pub(super) struct Filtered<V: Simd> {
 
 /// The voxels of cuboids of `A` by `B` by `C` that triangles meet, for their corners and the longest sides of their boxes.
 #[inline(always)]
-pub(super) fn cuboids<V: Simd, R: SurfaceRule, const A: usize, const B: usize, const C: usize>(
+pub(super) fn cuboids<V: Simd, R: SurfaceRule, const A: usize, const B: usize, const C: usize, const SURER: bool>(
     simd: V,
     rule: &R,
     v: &[[f32x16<V>; 3]; 3],
@@ -99,7 +101,7 @@ pub(super) fn cuboids<V: Simd, R: SurfaceRule, const A: usize, const B: usize, c
     let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
     let normal = &mut tests.normal;
     let mut n = [normal.across(&e, 1, 2), normal.across(&e, 2, 0), normal.across(&e, 0, 1)];
-    if fuses(simd) && normal.doubtful(simd) != 0 {
+    if fuses(simd) && (SURER || normal.doubtful(simd) != 0) {
         *normal = Normal::new(simd);
         n = [
             normal.surely_across(simd, &e, 1, 2),
@@ -109,9 +111,9 @@ pub(super) fn cuboids<V: Simd, R: SurfaceRule, const A: usize, const B: usize, c
     }
     let cells = &Cuboid::<A, B, C>::CELLS;
     let voxels = tests.plane::<R, A, B, C>(simd, rule, n, v[0])
-        & tests.edges::<R, B, C>(simd, rule, &Projection::new(v, &e, 1, 2, n[0]), &cells[0])
-        & tests.edges::<R, C, A>(simd, rule, &Projection::new(v, &e, 2, 0, n[1]), &cells[1])
-        & tests.edges::<R, A, B>(simd, rule, &Projection::new(v, &e, 0, 1, n[2]), &cells[2]);
+        & tests.edges::<R, B, C, SURER>(simd, rule, &Projection::new(v, &e, 1, 2, n[0]), &cells[0])
+        & tests.edges::<R, C, A, SURER>(simd, rule, &Projection::new(v, &e, 2, 0, n[1]), &cells[1])
+        & tests.edges::<R, A, B, SURER>(simd, rule, &Projection::new(v, &e, 0, 1, n[2]), &cells[2]);
     Filtered { voxels, doubtful: tests.doubtful(simd) }
 }
 
@@ -127,7 +129,7 @@ pub(super) fn layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
     let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
     let area = tests.normal.across(&e, 0, 1);
     let cells = &Cuboid::<SIDE, SIDE, 1>::CELLS[2];
-    let voxels = tests.edges::<R, SIDE, SIDE>(simd, rule, &Projection { v: *v, e, area }, cells);
+    let voxels = tests.edges::<R, SIDE, SIDE, false>(simd, rule, &Projection { v: *v, e, area }, cells);
     Filtered { voxels, doubtful: tests.doubtful(simd) }
 }
 
@@ -253,7 +255,7 @@ impl<V: Simd> Tests<V> {
 
     /// The voxels that cells of a projection show in which all three edge functions hold.
     #[inline(always)]
-    fn edges<R: SurfaceRule, const A: usize, const B: usize>(
+    fn edges<R: SurfaceRule, const A: usize, const B: usize, const SURER: bool>(
         &mut self,
         simd: V,
         rule: &R,
@@ -266,7 +268,13 @@ impl<V: Simd> Tests<V> {
         let mut least = [[zero; B]; A];
         for k in 0..3 {
             // Lengths without their sign are the same in another projection, and found once.
-            let reach = rule.centre_reach(e[k][0].abs(), e[k][1].abs()).max(self.edge_doubt);
+            let (la, lb) = (e[k][0].abs(), e[k][1].abs());
+            let mut reach = rule.centre_reach(la, lb);
+            if SURER {
+                reach = la.min(lb).simd_eq(zero).select(f32x16::splat(simd, FAR), reach);
+            } else {
+                reach = reach.max(self.edge_doubt);
+            }
             let (ea, eb) = (e[k][0] * side, e[k][1] * side);
             let at_middle = (-ea).mul_add(v[k][1], eb.mul_add(v[k][0], reach));
             for a in 0..A {
@@ -290,7 +298,7 @@ impl<V: Simd> Tests<V> {
 
 /// `a_i b_j - a_j b_i`, where `mul_sub` rounds once: of the right sign, and 0 only if it is 0 (Kahan's algorithm).
 #[inline(always)]
-fn determinant<V: Simd, const AXES: usize>(
+pub(super) fn determinant<V: Simd, const AXES: usize>(
     a: [f32x16<V>; AXES],
     b: [f32x16<V>; AXES],
     i: usize,

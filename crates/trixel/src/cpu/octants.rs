@@ -18,7 +18,8 @@
 
 use fearless_simd::{Simd, SimdFloat, f32x16, i32x16, mask32x16, prelude::*};
 
-use super::filter::{Tests, between};
+use super::filter::{Tests, between, determinant};
+use super::instructions::fuses;
 use super::triangles::{LANES, Lanes, Vectors};
 
 /// For each axis, the lanes that have voxels in the first and in the second layer of their cube.
@@ -52,9 +53,38 @@ pub(super) fn voxels<V: Simd>(
     if tests.doubtful(simd) & used != 0 {
         // A copy, so that corners need not be in memory anywhere else.
         let corners = *corners;
-        return exact(simd, &corners, middle, layers);
+        return surely(simd, &corners, middle, longest, scale, layers, used);
     }
     select(simd, signs.met::<_, false>(layers))
+}
+
+/// [`voxels`], with rounding only in the plane's height wherever products and sums are fused, and where that may have
+/// changed its sign, without any.
+#[cold]
+#[inline(never)]
+fn surely<V: Simd>(
+    simd: V,
+    corners: &Vectors<V>,
+    middle: [i32x16<V>; 3],
+    longest: f32x16<V>,
+    scale: f32,
+    layers: Layers,
+    used: Lanes,
+) -> i32x16<V> {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            if fuses(simd) {
+                let signs = Signs::surely(&corners.floats(middle, scale));
+                let mut tests = Tests::new(simd, longest);
+                tests.plane = signs.plane.abs();
+                if tests.doubtful(simd) & used == 0 {
+                    return select(simd, signs.met::<_, true>(layers));
+                }
+            }
+            exact(simd, corners, middle, layers)
+        },
+    )
 }
 
 /// [`voxels`] without rounding.
@@ -115,6 +145,23 @@ impl<F> Signs<F> {
             [edge(0, 2, 0), edge(1, 2, 0), edge(2, 2, 0)],
             [edge(0, 0, 1), edge(1, 0, 1), edge(2, 0, 1)],
         ];
+        let plane = n[0] * v[0][0] + n[1] * v[0][1] + n[2] * v[0][2];
+        Self { e, n, edges, plane }
+    }
+}
+
+impl<V: Simd> Signs<f32x16<V>> {
+    /// [`Self::new`], but all signs except the plane's are right where products and sums are fused.
+    #[inline(always)]
+    fn surely(v: &[[f32x16<V>; 3]; 3]) -> Self {
+        let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
+        let n = [determinant(e[0], e[1], 1, 2), determinant(e[0], e[1], 2, 0), determinant(e[0], e[1], 0, 1)];
+        let mut edges = e;
+        for i in 0..3 {
+            for k in 0..3 {
+                edges[i][k] = determinant(v[k], e[k], (i + 1) % 3, (i + 2) % 3);
+            }
+        }
         let plane = n[0] * v[0][0] + n[1] * v[0][1] + n[2] * v[0][2];
         Self { e, n, edges, plane }
     }

@@ -126,9 +126,9 @@ pub(super) fn send_cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
     let middle = middles(&boxes.low, SIDE);
     let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
     let Filtered { mut voxels, doubtful } =
-        filter::cuboids::<_, _, SIDE, SIDE, SIDE>(simd, rule, &corners.floats(middle, PER_HALF), longest);
+        filter::cuboids::<_, _, SIDE, SIDE, SIDE, false>(simd, rule, &corners.floats(middle, PER_HALF), longest);
     if doubtful & lanes != 0 {
-        voxels = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
+        voxels = sure_cubes::<_, _, SIDE>(simd, rule, &corners.stored(), lanes);
     }
     sink.cubes::<_, SIDE>(simd, &places, boxes.keep::<SIDE>(clip, voxels), lanes);
 }
@@ -201,7 +201,7 @@ pub(super) fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     let places = sink.places(&boxes.low, clip.base);
     let Filtered { mut voxels, doubtful } = in_layers::<_, _, SIDE>(simd, rule, corners, &boxes);
     if doubtful & lanes != 0 {
-        voxels = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
+        voxels = sure_cubes::<_, _, SIDE>(simd, rule, &corners.stored(), lanes);
     }
     sink.cubes::<_, SIDE>(simd, &places, boxes.keep::<SIDE>(clip, voxels), lanes);
 }
@@ -226,7 +226,7 @@ fn in_layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
         let v = [[v[0][0], v[0][1]], [v[1][0], v[1][1]], [v[2][0], v[2][1]]];
         filter::layers::<_, _, SIDE>(simd, rule, &v, longest)
     } else {
-        filter::cuboids::<_, _, SIDE, SIDE, 1>(simd, rule, &v, longest)
+        filter::cuboids::<_, _, SIDE, SIDE, 1, false>(simd, rule, &v, longest)
     };
     let voxels = if SIDE == 2 { layer.spread_two(cells) } else { layer.spread_three(cells) };
     Filtered { voxels, doubtful }
@@ -282,6 +282,28 @@ impl<V: Simd> Layer<V> {
         let bits = rows & 0o001_001_001 | (rows & 0o002_002_002) << 2 | (rows & 0o004_004_004) << 4;
         self.across_x.select(cells, self.across_z.select(bits, rows))
     }
+}
+
+/// The voxels of cubes of `SIDE` that triangles meet, of those inside their boxes; of triangles in `lanes`.
+#[inline(never)]
+fn sure_cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
+    simd: V,
+    rule: &R,
+    stored: &Stored,
+    lanes: Lanes,
+) -> i32x16<V> {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let corners = stored.vectors(simd, 0);
+            let boxes = Boxes::new(simd, &corners);
+            let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
+            let v = corners.floats(middles(&boxes.low, SIDE), PER_HALF);
+            let Filtered { voxels, doubtful } =
+                filter::cuboids::<_, _, SIDE, SIDE, SIDE, true>(simd, rule, &v, longest);
+            if doubtful & lanes == 0 { voxels } else { exact_cubes::<_, _, SIDE>(simd, rule, stored) }
+        },
+    )
 }
 
 /// The voxels of cubes of `SIDE`, without rounding.
@@ -430,7 +452,7 @@ mod tests {
             let corners = vectors(simd, &rows);
             let longest = Boxes::new(simd, &corners).longest.to_float::<f32x16<V>>() * PER_HALF;
             let low = [i32x16::splat(simd, 0); 3];
-            let filtered = filter::cuboids::<_, _, SIDE, SIDE, SIDE>(
+            let filtered = filter::cuboids::<_, _, SIDE, SIDE, SIDE, false>(
                 simd,
                 rule,
                 &corners.floats(middles(&low, SIDE), PER_HALF),
