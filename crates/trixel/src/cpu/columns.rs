@@ -12,12 +12,15 @@
 //! - An edge function is five sums of products of the edge's normal, with `l` for the sum of its two absolute values: off by
 //!   less than `5 u l (2 m + 2)`, and by less than four times `u l (2 m + 2)` more where it is divided by the normal's part
 //!   along z: [`EDGE_ERROR`] has twice of it.
-//! - Components of the normal are at most `m^2`, and off by `3 u m^2` (less where products and sums are fused). The plane's
-//!   term, z included, is off by less than `64 u m^2 (m + 2)`, of which [`PLANE_ERROR`] has twice. That is for z within the box:
-//!   the bound itself may be off by more where the normal's part along z is tiny, so it is compared after the box's.
+//! - The plane's term, z included, is off by less than `32 u s (m + 2)`, with `s` for the sum of the normal's absolute
+//!   components, each of which is off by `3 u` of itself where products and sums are fused (Kahan's algorithm): [`PLANE_ERROR`] has
+//!   twice of it. Where they are not, components are at most `m^2` and off by `3 u m^2`: the term is off by less than `64 u m^2
+//!   (m + 2)`, that is as if `s` were `2 m^2`. That is for z within the box: the bound itself may be off by more where the normal's
+//!   part along z is tiny, so it is compared after the box's.
 //! - Where products and sums are not fused, the sign of the normal's components may be wrong: such triangles are left whole.
-//! - Where a normal has no part along z, a bound is for all of a column or nothing, as if that part were tiny ([`NO_PART`]).
-//!   Of an edge that a projection shows as a point, all is 0, and nothing is excluded.
+//! - Where a normal has no part along z, the plane's bound is for all of a column or nothing, as if that part were tiny ([`NO_PART`]).
+//! - An edge that a projection shows along an axis, or as a point, excludes only what is outside the box, and nothing here: so
+//!   nothing of a triangle that touches the side of a voxel is in doubt for that.
 
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
 
@@ -32,10 +35,12 @@ use crate::lattice::{STEP_BITS, STEPS_PER_VOXEL};
 
 /// A share of an edge's length and of the longest side and two voxels by which an edge function may be off.
 const EDGE_ERROR: f32 = 64.0 * UNIT;
-/// A share of the square of the longest side, and of it and two voxels, by which the plane's term may be off.
-const PLANE_ERROR: f32 = 128.0 * UNIT;
+/// A share of the normal's absolute components, and of the longest side and two voxels, by which the plane's term may be off.
+const PLANE_ERROR: f32 = 64.0 * UNIT;
 /// Instead of a normal's part along z that is 0: so small that bounds are beyond all voxels.
 const NO_PART: f32 = 1e-30;
+/// Instead of the error of a normal that is 0: so large, beside that, that all is in doubt.
+const NO_NORMAL: f32 = 1e-20;
 /// Beyond any voxel.
 const FAR: f32 = 1e9;
 
@@ -232,8 +237,7 @@ fn send<V: Simd, R: SurfaceRule>(
     let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
     let [low, high] = corners.boxes();
     let none = i32x16::splat(simd, 0);
-    // At least a step, so that of a point the plane is in doubt.
-    let (mut first, mut last, mut sides) = ([none; 3], [none; 3], i32x16::splat(simd, 1));
+    let (mut first, mut last, mut sides) = ([none; 3], [none; 3], none);
     for i in 0..3 {
         first[i] = (clip.low[i] - low[i]).max(none);
         last[i] = high[i].min(clip.high[i]) - low[i];
@@ -299,12 +303,8 @@ fn send<V: Simd, R: SurfaceRule>(
     let n_z = n[2].abs().max(f32x16::splat(simd, NO_PART));
     let per_z = one / n_z;
     let reach = rule.centre_plane_reach([n[0].abs(), n[1].abs(), n[2].abs()]) * 0.5;
-    let error = if fuses(simd) {
-        let all = n[0].abs() + n[1].abs() + n[2].abs();
-        (all * near * (PLANE_ERROR * 0.5)).max(f32x16::splat(simd, 1e-20))
-    } else {
-        longest * longest * near * PLANE_ERROR
-    };
+    let components = if fuses(simd) { n[0].abs() + n[1].abs() + n[2].abs() } else { longest * longest * 2.0 };
+    let error = (components * near * PLANE_ERROR).max(f32x16::splat(simd, NO_NORMAL));
     let (thick, thick_surely) = ((reach + error) * per_z, (reach - error) * per_z);
     let slope = [n[0] * up * per_z, n[1] * up * per_z];
     let at_origin = -(n[0].mul_add(v[0][0], n[1].mul_add(v[0][1], n[2] * v[0][2])) * up * per_z);

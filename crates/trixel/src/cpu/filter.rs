@@ -15,6 +15,10 @@
 //!
 //! An edge that a projection shows as a point has only zeros. It passes whatever the voxel, and is given a reach that says
 //! so; the reach of any other is at least a step, `2^-15`, and thus as large as `64 u m` without help.
+//!
+//! An edge along an axis, as a projection shows it, excludes only what is outside the triangle's box. So does a point. Who looks
+//! at voxels in boxes alone can pass over both (`SURER`): in meshes whose edges are on the sides of voxels, they are most of
+//! what is in doubt. Looking for them at once would take longer than it saves.
 
 use fearless_simd::{Simd, SimdFloat, f32x16, i32x16, prelude::*};
 
@@ -89,7 +93,8 @@ pub(super) struct Filtered<V: Simd> {
     pub(super) doubtful: u64,
 }
 
-/// The voxels of cuboids of `A` by `B` by `C` that triangles meet, for their corners and the longest sides of their boxes.
+/// The voxels of cuboids of `A` by `B` by `C` that triangles meet, for their corners and the longest sides of their boxes: if
+/// `SURER`, of those inside the boxes, with less doubt.
 #[inline(always)]
 pub(super) fn cuboids<V: Simd, R: SurfaceRule, const A: usize, const B: usize, const C: usize, const SURER: bool>(
     simd: V,

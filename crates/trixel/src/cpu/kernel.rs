@@ -7,7 +7,7 @@
 //! |---|---|
 //! | at most two voxels along each axis, where touching is enough | [`octants`](super::octants): sixteen triangles at a time |
 //! | at most three, on surfaces | [`tiny`]: sixteen triangles at a time |
-//! | at most sixteen, and eight along x or y, on surfaces | [`columns`](super::columns): a column of sixteen triangles at a time |
+//! | at most sixteen along z, and 16 by 8 or 32 by 2 columns, on surfaces | [`columns`](super::columns): a column of sixteen triangles at a time |
 //! | at most four, in mode solid | [`crossings`]: sixteen triangles at a time |
 //! | one voxel along two axes, where touching is enough | the box itself |
 //! | at most 64 voxels | [`rows`]: eight columns of a triangle at a time |

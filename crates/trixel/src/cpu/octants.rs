@@ -12,9 +12,11 @@
 //! them, is outside.
 //!
 //! The signs are first taken in f32, with the unit, origin and bounds of [`filter`](super::filter). Where rounding may have
-//! changed one, they are taken in f64 from lattice steps, which is exact: corners are within 2^16 steps of the middle,
-//! edges and products below 2^17 and 2^33, normals below 2^35, and the three products of the plane's term below 2^52. Only
-//! there are edges through the middle told from those beside it: in f32 they are in doubt.
+//! changed one, all but the plane's are found again by Kahan's algorithm for the difference of two products, if the processor
+//! fuses products and sums. The plane's, and all on other processors, are taken in f64 from lattice steps, which is exact:
+//! corners are within 2^16 steps of the middle, edges and products below 2^17 and 2^33, normals below 2^35, and the three
+//! products of the plane's term below 2^52. Only in the latter two are edges through the middle told from those beside it: at
+//! first they are in doubt.
 
 use fearless_simd::{Simd, SimdFloat, f32x16, i32x16, mask32x16, prelude::*};
 
@@ -58,8 +60,7 @@ pub(super) fn voxels<V: Simd>(
     select(simd, signs.met::<_, false>(layers))
 }
 
-/// [`voxels`], with rounding only in the plane's height wherever products and sums are fused, and where that may have
-/// changed its sign, without any.
+/// [`voxels`], whatever rounding may have changed.
 #[cold]
 #[inline(never)]
 fn surely<V: Simd>(

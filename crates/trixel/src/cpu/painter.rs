@@ -61,12 +61,19 @@ impl Painter {
         }
     }
 
-    /// Moves the voxels of a copy into the original.
+    /// Moves the voxels or toggles of a copy into the original.
     #[cfg(feature = "threads")]
     pub(super) fn move_voxels(&self, from: &mut [u64], to: &mut [u64]) {
+        let toggles = self.toggles();
         dispatch!(self.level, simd => simd.vectorize(
             #[inline(always)]
-            || move_voxels(from, to)
+            || {
+                if toggles {
+                    move_voxels(from, to, |to, from| to ^ from);
+                } else {
+                    move_voxels(from, to, |to, from| to | from);
+                }
+            }
         ));
     }
 
@@ -123,12 +130,12 @@ impl Painter {
 /// In blocks, because most of a copy has no voxels, and what has some is quicker moved without asking.
 #[cfg(feature = "threads")]
 #[inline(always)]
-fn move_voxels(from: &mut [u64], to: &mut [u64]) {
+fn move_voxels(from: &mut [u64], to: &mut [u64], join: impl Fn(u64, u64) -> u64) {
     const BLOCK: usize = 64;
     for (to, from) in to.chunks_mut(BLOCK).zip(from.chunks_mut(BLOCK)) {
         if from.iter().fold(0, |all, word| all | word) != 0 {
             for (to, from) in to.iter_mut().zip(from) {
-                *to |= std::mem::take(from);
+                *to = join(*to, std::mem::take(from));
             }
         }
     }
@@ -154,4 +161,27 @@ fn surface<'a, R: SurfaceRule>(
     sink: &mut impl CubeSink,
 ) {
     dispatch!(level, simd => kernel::surface(simd, rule, mesh, pieces, clip, sink));
+}
+
+#[cfg(feature = "threads")]
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Grid;
+    use crate::cpu::instructions::Instructions;
+
+    #[test]
+    fn copies_are_moved() {
+        let grid = Grid::new([0.0; 3], [1.0; 3], [1; 3]).unwrap();
+        for mode in Mode::ALL {
+            let painter = Painter::new(Instructions::Best.level(), &Job::new(grid, mode));
+            let (mut from, mut to) = ([0; 1000], [0b0110; 1000]);
+            from[70..].fill(0b0011);
+            painter.move_voxels(&mut from, &mut to);
+            // What both toggle is as it was.
+            let both = if painter.toggles() { 0b0101 } else { 0b0111 };
+            assert_eq!((to[..70].to_vec(), to[70..].to_vec()), (vec![0b0110; 70], vec![both; 930]), "{mode}");
+            assert_eq!(from, [0; 1000], "{mode}");
+        }
+    }
 }

@@ -1,9 +1,9 @@
 //! Triangles whose box is at most three voxels along each axis: sixteen at a time, one a vector lane.
 //!
-//! First in f32 ([`filter`]). Where rounding may have decided a test, all are repeated in f64, in two halves of eight
-//! lanes. That is exact, as everything is integers below 2^53: corners are below 2^18 steps from the box's corner, edge
-//! functions below 2^38, normals below 2^36, and the plane's terms smaller than those of larger triangles, which fit too
-//! ([`rows`](super::rows)).
+//! First in f32 ([`filter`]). Where rounding may have decided a test, all are repeated with less doubt, and where there is
+//! still some, in f64, in two halves of eight lanes. That is exact, as everything is integers below 2^53: corners are below
+//! 2^18 steps from the box's corner, edge functions below 2^38, normals below 2^36, and the plane's terms smaller than those
+//! of larger triangles, which fit too ([`rows`](super::rows)).
 
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, i64x8, mask32x16, prelude::*};
 
@@ -284,7 +284,7 @@ impl<V: Simd> Layer<V> {
     }
 }
 
-/// The voxels of cubes of `SIDE` that triangles meet, of those inside their boxes; of triangles in `lanes`.
+/// The voxels of cubes of `SIDE` that triangles meet, of those inside their boxes; only the lanes in `lanes` are right.
 #[inline(never)]
 fn sure_cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
     simd: V,
@@ -419,8 +419,6 @@ mod tests {
     use crate::cpu::triangles::LANES;
 
     const ROUNDS: u32 = 500;
-    /// Lanes of a vector of f64.
-    const HALF: usize = LANES / 2;
 
     /// Triangles whose boxes are inside a cube of `side` voxels at the origin: corner, axis, lane.
     fn in_cube(random: &mut Random, round: u32, side: i64) -> [[[i32; LANES]; 3]; 3] {
@@ -444,34 +442,44 @@ mod tests {
     }
 
     /// The share of triangles that the filter decides, all of them as the exact tests do.
-    fn decided<V: Simd, R: SurfaceRule, const SIDE: usize>(simd: V, rule: &R) -> f64 {
+    fn decided<V: Simd, R: SurfaceRule, const SIDE: usize, const SURER: bool>(simd: V, rule: &R) -> f64 {
         let mut random = Random::new(SIDE as u64);
         let mut decided = 0;
         for round in 0..ROUNDS {
             let rows = in_cube(&mut random, round, i64::try_from(SIDE).unwrap());
             let corners = vectors(simd, &rows);
-            let longest = Boxes::new(simd, &corners).longest.to_float::<f32x16<V>>() * PER_HALF;
-            let low = [i32x16::splat(simd, 0); 3];
-            let filtered = filter::cuboids::<_, _, SIDE, SIDE, SIDE, false>(
+            let boxes = Boxes::new(simd, &corners);
+            let exact = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
+            let Filtered { voxels, doubtful } = filter::cuboids::<_, _, SIDE, SIDE, SIDE, SURER>(
                 simd,
                 rule,
-                &corners.floats(middles(&low, SIDE), PER_HALF),
-                longest,
+                &corners.floats(middles(&boxes.low, SIDE), PER_HALF),
+                boxes.longest.to_float::<f32x16<V>>() * PER_HALF,
             );
-            let voxels = filtered.voxels;
-            for (half, corners) in corners.halves(simd, low, 1.0).iter().enumerate() {
-                let mut exact_bits = [0; HALF];
-                exact::<_, _, SIDE>(simd, rule, corners).store_slice(&mut exact_bits);
-                for (lane, exact) in (HALF * half..).zip(exact_bits) {
-                    if filtered.doubtful >> lane & 1 == 0 {
-                        let corners = rows.map(|corner| corner.map(|row| row[lane]));
-                        assert_eq!(i64::from(voxels[lane]), exact, "side {SIDE}, round {round}, {corners:?}");
-                        decided += 1;
-                    }
-                }
-            }
+            decided += agreeing::<_, SIDE>(simd, &rows, &boxes, exact, voxels, doubtful);
         }
         f64::from(decided) / f64::from(ROUNDS * u32::try_from(LANES).unwrap())
+    }
+
+    /// How many of the lanes are decided: all of them as the exact tests do, inside the boxes.
+    fn agreeing<V: Simd, const SIDE: usize>(
+        simd: V,
+        rows: &[[[i32; LANES]; 3]; 3],
+        boxes: &Boxes<V>,
+        exact: i32x16<V>,
+        voxels: i32x16<V>,
+        doubtful: u64,
+    ) -> u32 {
+        let all = i32x16::splat(simd, i32::try_from(SIDE).unwrap());
+        let clip = NearClip { base: [0; 3], low: [i32x16::splat(simd, 0); 3], high: [all; 3] };
+        let [exact, voxels] = [exact, voxels].map(|voxels| boxes.keep::<SIDE>(&clip, voxels));
+        let mut decided = 0;
+        for lane in (0..LANES).filter(|lane| doubtful >> lane & 1 == 0) {
+            let corners = rows.map(|corner| corner.map(|row| row[lane]));
+            assert_eq!(voxels[lane], exact[lane], "side {SIDE}, {corners:?}");
+            decided += 1;
+        }
+        decided
     }
 
     /// The share of triangles in one layer that the filter decides, all of them as the exact tests do.
@@ -494,14 +502,7 @@ mod tests {
             let boxes = Boxes::new(simd, &corners);
             let exact = exact_cubes::<_, _, SIDE>(simd, rule, &corners.stored());
             let Filtered { voxels, doubtful } = in_layers::<_, _, SIDE>(simd, rule, &corners, &boxes);
-            let all = i32x16::splat(simd, i32::try_from(SIDE).unwrap());
-            let clip = NearClip { base: [0; 3], low: [i32x16::splat(simd, 0); 3], high: [all; 3] };
-            let [exact, voxels] = [exact, voxels].map(|voxels| boxes.keep::<SIDE>(&clip, voxels));
-            for lane in (0..LANES).filter(|lane| doubtful >> lane & 1 == 0) {
-                let corners = rows.map(|corner| corner.map(|row| row[lane]));
-                assert_eq!(voxels[lane], exact[lane], "side {SIDE}, round {round}, {corners:?}");
-                decided += 1;
-            }
+            decided += agreeing::<_, SIDE>(simd, &rows, &boxes, exact, voxels, doubtful);
         }
         f64::from(decided) / f64::from(ROUNDS * u32::try_from(LANES).unwrap())
     }
@@ -559,6 +560,32 @@ mod tests {
         }
     }
 
+    /// Triangles of which some are in doubt get the voxels of boxes that the exact tests do.
+    fn sure_cubes_are_exact<V: Simd, R: SurfaceRule, const SIDE: usize>(simd: V, rule: &R) {
+        let mut random = Random::new(9);
+        for round in 0..ROUNDS {
+            let rows = in_cube(&mut random, round, i64::try_from(SIDE).unwrap());
+            let corners = vectors(simd, &rows);
+            let stored = corners.stored();
+            let exact = exact_cubes::<_, _, SIDE>(simd, rule, &stored);
+            for lane in 0..LANES {
+                // Alone, so that the others' doubts do not matter.
+                let alone = sure_cubes::<_, _, SIDE>(simd, rule, &stored, 1 << lane);
+                agreeing::<_, SIDE>(simd, &rows, &Boxes::new(simd, &corners), exact, alone, !(1 << lane));
+            }
+        }
+    }
+
+    #[test]
+    fn sure_cubes_give_what_the_exact_tests_do() {
+        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => {
+            sure_cubes_are_exact::<_, _, 2>(simd, &Conservative);
+            sure_cubes_are_exact::<_, _, 3>(simd, &Conservative);
+            sure_cubes_are_exact::<_, _, 2>(simd, &Thin);
+            sure_cubes_are_exact::<_, _, 3>(simd, &Thin);
+        });
+    }
+
     #[test]
     fn octants_give_what_the_exact_tests_do() {
         fearless_simd::dispatch!(fearless_simd::Level::new(), simd => octants_are_exact(simd));
@@ -567,15 +594,22 @@ mod tests {
     #[test]
     fn the_filter_doubts_whatever_it_may_get_wrong() {
         let shares = fearless_simd::dispatch!(fearless_simd::Level::new(), simd => [
-            decided::<_, _, 2>(simd, &Conservative),
-            decided::<_, _, 3>(simd, &Conservative),
-            decided::<_, _, 2>(simd, &Thin),
-            decided::<_, _, 3>(simd, &Thin),
+            decided::<_, _, 2, false>(simd, &Conservative),
+            decided::<_, _, 3, false>(simd, &Conservative),
+            decided::<_, _, 2, false>(simd, &Thin),
+            decided::<_, _, 3, false>(simd, &Thin),
+            decided::<_, _, 2, true>(simd, &Conservative),
+            decided::<_, _, 3, true>(simd, &Conservative),
+            decided::<_, _, 2, true>(simd, &Thin),
+            decided::<_, _, 3, true>(simd, &Thin),
             decided_in_layers::<_, _, 3>(simd, &Conservative),
             decided_in_layers::<_, _, 2>(simd, &Thin),
             decided_in_layers::<_, _, 3>(simd, &Thin),
         ]);
         // Of five placements, one has no ties and the others little else.
         assert!(shares.iter().all(|share| (0.15..0.9).contains(share)), "{shares:?}");
+        for fast in 0..4 {
+            assert!(shares[fast] < shares[fast + 4], "{shares:?}");
+        }
     }
 }
