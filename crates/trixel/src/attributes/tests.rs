@@ -370,6 +370,7 @@ fn winners_are_those_of_a_search_through_all_triangles() {
     }
 }
 
+#[cfg(feature = "threads")]
 #[test]
 fn results_do_not_depend_on_threads_or_slabs() {
     let mut random = Random::new(22);

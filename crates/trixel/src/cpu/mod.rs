@@ -13,11 +13,13 @@
 //! - `painter`: a mode and the instructions, together
 //! - `prefetch`: memory before it is needed
 //! - `triangles`: which triangles, and their corners, alone or as vectors
-//! - `slabs`: a dense grid cut along x, one piece a task, so that threads never share a word; `outbox`, `gate`: what it does
-//!   that with
+//! - `slabs`: a dense grid cut along x, one piece a task, so that threads never share a word; `outbox`, `gate`, `crew`: what
+//!   it does that with
 //! - `pillars`: a sparse grid cut into pillars of bricks
 
 mod columns;
+#[cfg(feature = "threads")]
+mod crew;
 mod crossings;
 mod filter;
 pub(crate) mod fragments;
@@ -76,7 +78,8 @@ pub struct ThreadsError {
 }
 
 impl CpuBackend {
-    /// A backend with `threads` threads of its own. ([`CpuBackend::default`] uses rayon's global pool.)
+    /// A backend with `threads` threads: whichever calls [`Backend::voxelize`], and others of its own.
+    /// ([`CpuBackend::default`] uses rayon's global pool.)
     ///
     /// # Errors
     /// When the system refuses to start them.
@@ -184,7 +187,14 @@ impl Backend for CpuBackend {
             return Err(Error::GridMismatch);
         }
         let painter = Painter::new(self.instructions.level(), job);
-        self.install(|| slabs::voxelize(&painter, mesh, volume, &self.spare));
+        slabs::voxelize(
+            &painter,
+            mesh,
+            volume,
+            &self.spare,
+            #[cfg(feature = "threads")]
+            &crew::Crew::new(self.pool.as_ref()),
+        );
         Ok(strategy)
     }
 }

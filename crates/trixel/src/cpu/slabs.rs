@@ -9,6 +9,8 @@
 //! Each thread begins at a place of its own in the mesh, because triangles that follow each other are mostly near each
 //! other, and helps the others when it is done.
 
+#[cfg(feature = "threads")]
+use super::crew::Crew;
 use super::kernel::VoxelBox;
 use super::painter::Painter;
 use super::sink::{Slab, prefix_xor};
@@ -25,10 +27,16 @@ pub(super) struct Spare {
 
 /// Clears the volume and sets the voxels of the painter's mode.
 #[cfg_attr(not(feature = "threads"), expect(unused_variables, reason = "one thread keeps nothing"))]
-pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut Volume, spare: &Spare) {
+pub(super) fn voxelize(
+    painter: &Painter,
+    mesh: &LatticeMesh<'_>,
+    volume: &mut Volume,
+    spare: &Spare,
+    #[cfg(feature = "threads")] crew: &Crew<'_>,
+) {
     #[cfg(feature = "threads")]
     {
-        let threads = rayon::current_num_threads();
+        let threads = crew.count();
         // Threads share triangles by 32-bit numbers.
         if let Ok(triangles) = u32::try_from(mesh.triangles.len())
             && volume.grid().dims()[0] > 1
@@ -36,9 +44,9 @@ pub(super) fn voxelize(painter: &Painter, mesh: &LatticeMesh<'_>, volume: &mut V
         {
             let parts = parallel::Parts::new(triangles, threads);
             if parallel::copies_are_small(painter, mesh, volume, threads) {
-                parallel::voxelize_in_copies(painter, mesh, volume, &parts, spare);
+                parallel::voxelize_in_copies(painter, mesh, volume, &parts, spare, crew);
             } else {
-                parallel::voxelize_in_slabs(painter, mesh, volume, &parts, spare);
+                parallel::voxelize_in_slabs(painter, mesh, volume, &parts, spare, crew);
             }
             return;
         }
@@ -71,9 +79,8 @@ mod parallel {
     use std::sync::atomic::{AtomicU64, Ordering};
     use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-    use rayon::prelude::*;
-
     use super::{LatticeMesh, Painter, Selected, Slab, Spare, VoxelBox, clip_of, prefix_xor};
+    use crate::cpu::crew::Crew;
     use crate::cpu::gate::Gate;
     use crate::cpu::outbox::{Compartment, Cuts, Outbox};
     use crate::cpu::triangles::{BLOCK, corners};
@@ -237,6 +244,7 @@ mod parallel {
         volume: &mut Volume,
         parts: &Parts,
         spare: &Spare,
+        crew: &Crew<'_>,
     ) {
         let (dims, threads) = (volume.grid().dims(), parts.count());
         let (columns, column_words) = (dims[1] as usize, volume.column_words());
@@ -268,7 +276,7 @@ mod parallel {
                 }
             }
         };
-        rayon::scope(|scope| {
+        crew.scope(|scope| {
             for ((i, kept), copy) in (1..).zip(&mut kept).zip(&copies) {
                 let (gate, join, paint) = (&gate, &join, &paint);
                 scope.spawn(move |_| {
@@ -312,6 +320,7 @@ mod parallel {
         volume: &mut Volume,
         parts: &Parts,
         spare: &Spare,
+        crew: &Crew<'_>,
     ) {
         let dims = volume.grid().dims();
         let threads = parts.count();
@@ -327,7 +336,7 @@ mod parallel {
             // For whoever comes first, one after the other: the largest are at the beginning.
             let slabs = Mutex::new(cuts.slabs(words).into_iter().enumerate());
             let next = || lock(&slabs).next();
-            kept.par_iter_mut().with_max_len(1).enumerate().for_each(|(i, kept)| {
+            let share = |i: usize, kept: &mut Vec<Compartment>| {
                 gate.pass(|| {
                     let mut outbox = Outbox::new(&cuts, std::mem::take(kept));
                     painter.sort(mesh, parts.pieces(mesh, i), &grid, &mut outbox);
@@ -344,6 +353,17 @@ mod parallel {
                     if last && painter.toggles() {
                         prefix_xor(slab.words, slab.column_words, dims[2]);
                     }
+                }
+            };
+            crew.scope(|scope| {
+                let mut all = kept.iter_mut().enumerate();
+                let mine = all.next();
+                for (i, kept) in all {
+                    let share = &share;
+                    scope.spawn(move |_| share(i, kept));
+                }
+                if let Some((i, kept)) = mine {
+                    share(i, kept);
                 }
             });
             for (kept, sorted) in kept.iter_mut().zip(sorted) {
