@@ -3,6 +3,7 @@
 use super::*;
 use crate::conformance::oracle;
 use crate::conformance::random::{Placement, Random, triangle};
+#[cfg(feature = "threads")]
 use crate::cpu::CpuBackend;
 use crate::grid::Grid;
 use crate::lattice::STEPS_PER_VOXEL;

@@ -20,11 +20,12 @@
 //! - Where products and sums are not fused, the sign of the normal's components may be wrong: such triangles are left whole.
 //! - Where a normal has no part along z, the plane's bound is for all of a column or nothing, as if that part were tiny ([`NO_PART`]).
 //! - An edge that a projection shows along an axis, or as a point, excludes only what is outside the box, and nothing here: so
-//!   nothing of a triangle that touches the side of a voxel is in doubt for that.
+//!   nothing is in doubt because an edge is on the side of a voxel. The same goes for a plane across an axis, and for none
+//!   ([`filter`](super::filter)).
 
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
 
-use super::filter::{Normal, UNIT, between};
+use super::filter::{Normal, UNIT, between, faces_axis};
 use super::instructions::fuses;
 use super::kernel::NearClip;
 use super::rows::{Rows, exchange};
@@ -39,8 +40,6 @@ const EDGE_ERROR: f32 = 64.0 * UNIT;
 const PLANE_ERROR: f32 = 64.0 * UNIT;
 /// Instead of a normal's part along z that is 0: so small that bounds are beyond all voxels.
 const NO_PART: f32 = 1e-30;
-/// Instead of the error of a normal that is 0: so large, beside that, that all is in doubt.
-const NO_NORMAL: f32 = 1e-20;
 /// Beyond any voxel.
 const FAR: f32 = 1e9;
 
@@ -300,12 +299,15 @@ fn send<V: Simd, R: SurfaceRule>(
     }
     // The plane, pointing up.
     let up = one.copysign(n[2]);
-    let n_z = n[2].abs().max(f32x16::splat(simd, NO_PART));
-    let per_z = one / n_z;
-    let reach = rule.centre_plane_reach([n[0].abs(), n[1].abs(), n[2].abs()]) * 0.5;
-    let components = if fuses(simd) { n[0].abs() + n[1].abs() + n[2].abs() } else { longest * longest * 2.0 };
-    let error = (components * near * PLANE_ERROR).max(f32x16::splat(simd, NO_NORMAL));
-    let (thick, thick_surely) = ((reach + error) * per_z, (reach - error) * per_z);
+    let [n_x, n_y, n_z] = [n[0].abs(), n[1].abs(), n[2].abs()];
+    let faces = faces_axis([n_x, n_y, n_z]);
+    let per_z = faces.select(zero, one / n_z.max(f32x16::splat(simd, NO_PART)));
+    let reach = rule.centre_plane_reach([n_x, n_y, n_z]) * 0.5;
+    let components = if fuses(simd) { n_x + n_y + n_z } else { longest * longest * 2.0 };
+    let error = components * near * PLANE_ERROR;
+    let far = f32x16::splat(simd, FAR);
+    let thick = faces.select(far, (reach + error) * per_z);
+    let thick_surely = faces.select(far, (reach - error) * per_z);
     let slope = [n[0] * up * per_z, n[1] * up * per_z];
     let at_origin = -(n[0].mul_add(v[0][0], n[1].mul_add(v[0][1], n[2] * v[0][2])) * up * per_z);
 
@@ -416,14 +418,15 @@ mod tests {
                 clip.low = [random.range(20, 26), random.range(20, 26), random.range(20, 26)];
                 clip.high = [random.range(28, 34), random.range(28, 34), random.range(28, 34)];
             }
+            let (size, longest) = [([8, 16, 16], 10), ([2, 32, 16], 26), ([32, 2, 16], 26)][round as usize / 60 % 3];
             for lane in 0..LANES {
-                let extent = random.range(1, 10);
+                let extent = random.range(1, longest);
                 let mut corners = triangle(&mut random, placement, 24, 30, extent);
                 if round % 4 == 0 {
                     needle(&mut random, &mut corners);
                 }
-                // Of at most eight by sixteen columns and sixteen voxels.
-                let most = [8, 16, 16].map(|voxels| (24 + voxels) * i64::from(STEPS_PER_VOXEL) - 1);
+                // Of the most columns that go this way, and sixteen voxels.
+                let most = size.map(|voxels| (24 + voxels) * i64::from(STEPS_PER_VOXEL) - 1);
                 for (k, i) in (0..9).map(|at| (at / 3, at % 3)) {
                     let at = corners[k][i].clamp(24 * i64::from(STEPS_PER_VOXEL) + 1, most[i]);
                     rows[k][i][lane] = i32::try_from(at).unwrap();
@@ -465,11 +468,9 @@ mod tests {
         [found.0, expected.0]
     }
 
-    const LEVELS: [Instructions; 4] = [Instructions::Best, Instructions::Avx2, Instructions::Sse42, Instructions::Sse2];
-
     #[test]
     fn what_rounding_may_have_decided_is_left() {
-        for level in LEVELS {
+        for level in Instructions::ALL {
             let shares = fearless_simd::dispatch!(level.level(), simd => [
                 decided(simd, &Conservative),
                 decided(simd, &Thin),
@@ -486,7 +487,7 @@ mod tests {
         let corners = [[684_851, 668_467, 717_783], [1_340_211, 668_467, 1_383_143], [684_852, 865_075, 717_784]];
         let rows = corners.map(|corner| corner.map(|at| [at; LANES]));
         let clip = VoxelBox { low: [0; 3], high: [63; 3] };
-        for level in LEVELS {
+        for level in Instructions::ALL {
             fearless_simd::dispatch!(level.level(), simd => {
                 let [found, expected] = found_and_expected(simd, &Thin, &rows, &clip, &mut 0);
                 assert_eq!(found, expected, "{level:?}");

@@ -16,11 +16,13 @@
 //! An edge that a projection shows as a point has only zeros. It passes whatever the voxel, and is given a reach that says
 //! so; the reach of any other is at least a step, `2^-15`, and thus as large as `64 u m` without help.
 //!
-//! An edge along an axis, as a projection shows it, excludes only what is outside the triangle's box. So does a point. Who looks
-//! at voxels in boxes alone can pass over both (`SURER`): in meshes whose edges are on the sides of voxels, they are most of
-//! what is in doubt. Looking for them at once would take longer than it saves.
+//! An edge along an axis, as a projection shows it, excludes only what is outside the triangle's box: in both modes it reaches
+//! half a voxel, and where there is an area, the third corner is on its inner side, and where there is none, on it. So does a point.
+//! A plane across an axis likewise excludes nothing inside the box, nor does a normal that is 0. Who looks at voxels in boxes
+//! alone can pass over all of these (`SURER`): in meshes whose edges are on the sides of voxels, they are most of what is in
+//! doubt. Looking for them at once would take longer than it saves.
 
-use fearless_simd::{Simd, SimdFloat, f32x16, i32x16, prelude::*};
+use fearless_simd::{Simd, SimdFloat, f32x16, i32x16, mask32x16, prelude::*};
 
 use super::instructions::fuses;
 use super::rule::SurfaceRule;
@@ -115,7 +117,7 @@ pub(super) fn cuboids<V: Simd, R: SurfaceRule, const A: usize, const B: usize, c
         ];
     }
     let cells = &Cuboid::<A, B, C>::CELLS;
-    let voxels = tests.plane::<R, A, B, C>(simd, rule, n, v[0])
+    let voxels = tests.plane::<R, A, B, C, SURER>(simd, rule, n, v[0])
         & tests.edges::<R, B, C, SURER>(simd, rule, &Projection::new(v, &e, 1, 2, n[0]), &cells[0])
         & tests.edges::<R, C, A, SURER>(simd, rule, &Projection::new(v, &e, 2, 0, n[1]), &cells[1])
         & tests.edges::<R, A, B, SURER>(simd, rule, &Projection::new(v, &e, 0, 1, n[2]), &cells[2]);
@@ -231,7 +233,7 @@ impl<V: Simd> Tests<V> {
 
     /// The voxels within reach of the plane.
     #[inline(always)]
-    fn plane<R: SurfaceRule, const A: usize, const B: usize, const C: usize>(
+    fn plane<R: SurfaceRule, const A: usize, const B: usize, const C: usize, const SURER: bool>(
         &mut self,
         simd: V,
         rule: &R,
@@ -240,7 +242,11 @@ impl<V: Simd> Tests<V> {
     ) -> i32x16<V> {
         let zero = f32x16::splat(simd, 0.0);
         let mut voxels = i32x16::splat(simd, 0);
-        let reach = rule.centre_plane_reach([n[0].abs(), n[1].abs(), n[2].abs()]);
+        let lengths = [n[0].abs(), n[1].abs(), n[2].abs()];
+        let mut reach = rule.centre_plane_reach(lengths);
+        if SURER {
+            reach = faces_axis(lengths).select(f32x16::splat(simd, FAR), reach);
+        }
         let at_middle = n[2].mul_add(v[2], n[1].mul_add(v[1], n[0] * v[0]));
         for x in 0..A {
             let at_x = n[0] * centre::<A>(x) - at_middle;
@@ -312,6 +318,12 @@ pub(super) fn determinant<V: Simd, const AXES: usize>(
     let product = a[j] * b[i];
     let lost = a[j].mul_sub(b[i], product);
     a[i].mul_sub(b[j], product) - lost
+}
+
+/// Where a normal, of which the absolute components are given, is along an axis or 0.
+#[inline(always)]
+pub(super) fn faces_axis<V: Simd>(n: [f32x16<V>; 3]) -> mask32x16<V> {
+    (n[0] + n[1]).min(n[1] + n[2]).min(n[2] + n[0]).simd_le(0.0)
 }
 
 /// The centre of the `i`th voxel along a side.

@@ -18,6 +18,10 @@ pub enum Instructions {
 }
 
 impl Instructions {
+    /// All of them.
+    #[cfg(test)]
+    pub(super) const ALL: [Self; 4] = [Self::Best, Self::Avx2, Self::Sse42, Self::Sse2];
+
     pub(super) fn level(self) -> Level {
         let best = Level::new();
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]

@@ -78,8 +78,9 @@ pub struct ThreadsError {
 }
 
 impl CpuBackend {
-    /// A backend with `threads` threads: whichever calls [`Backend::voxelize`], and others of its own.
-    /// ([`CpuBackend::default`] uses rayon's global pool.)
+    /// A backend with a pool of `threads` threads of its own. ([`CpuBackend::default`] uses rayon's global one.) A thread that
+    /// calls [`Backend::voxelize`] works too, with one less of the pool's, so callers at the same time do not wait for each
+    /// other; whatever else is asked for runs in the pool alone.
     ///
     /// # Errors
     /// When the system refuses to start them.

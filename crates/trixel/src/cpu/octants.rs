@@ -12,15 +12,15 @@
 //! them, is outside.
 //!
 //! The signs are first taken in f32, with the unit, origin and bounds of [`filter`](super::filter). Where rounding may have
-//! changed one, all but the plane's are found again by Kahan's algorithm for the difference of two products, if the processor
-//! fuses products and sums. The plane's, and all on other processors, are taken in f64 from lattice steps, which is exact:
-//! corners are within 2^16 steps of the middle, edges and products below 2^17 and 2^33, normals below 2^35, and the three
-//! products of the plane's term below 2^52. Only in the latter two are edges through the middle told from those beside it: at
-//! first they are in doubt.
+//! changed one, they are found again by Kahan's algorithm for the difference of two products, if the processor fuses products
+//! and sums: all are right then, but the plane's. Where that is still in doubt, and on other processors, all are taken in f64
+//! from lattice steps, which is exact: corners are within 2^16 steps of the middle, edges and products below 2^17 and 2^33,
+//! normals below 2^35, and the three products of the plane's term below 2^52. Only in the latter two are edges through the
+//! middle told from those beside it: at first they are in doubt.
 
 use fearless_simd::{Simd, SimdFloat, f32x16, i32x16, mask32x16, prelude::*};
 
-use super::filter::{Tests, between, determinant};
+use super::filter::{Tests, between, determinant, faces_axis};
 use super::instructions::fuses;
 use super::triangles::{LANES, Lanes, Vectors};
 
@@ -78,7 +78,10 @@ fn surely<V: Simd>(
             if fuses(simd) {
                 let signs = Signs::surely(&corners.floats(middle, scale));
                 let mut tests = Tests::new(simd, longest);
-                tests.plane = signs.plane.abs();
+                // Of a normal along an axis, the plane is one product.
+                let [x, y, z] = signs.n;
+                let sure = faces_axis([x.abs(), y.abs(), z.abs()]);
+                tests.plane = sure.select(tests.plane, signs.plane.abs());
                 if tests.doubtful(simd) & used == 0 {
                     return select(simd, signs.met::<_, true>(layers));
                 }

@@ -496,7 +496,40 @@ mod tests {
         mesh.triangles.extend_from_within(..);
         let bounds = mesh.bounds().unwrap();
         for resolution in [33, 90] {
-            threads_give_what_one_does_of(&mesh, "two spheres", Grid::fit(&bounds, resolution).unwrap());
+            let grid = Grid::fit(&bounds, resolution).unwrap();
+            threads_give_what_one_does_of(&mesh, "two spheres", grid);
+            let mut volume = Volume::new(grid).unwrap();
+            let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
+            CpuBackend::with_threads(7).unwrap().voxelize(&lattice, &Job::new(grid, Mode::Solid), &mut volume).unwrap();
+            assert_eq!(volume.count(), 0, "{resolution}");
+        }
+    }
+
+    /// From outside of any pool, from a pool's own threads, from another pool's, and all at once.
+    #[test]
+    fn whoever_calls_gets_the_same() {
+        let mesh = scene::build("sphere:48").unwrap();
+        for resolution in [33, 90] {
+            let grid = Grid::fit(&mesh.bounds().unwrap(), resolution).unwrap();
+            let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
+            for mode in Mode::ALL {
+                let job = Job::new(grid, mode);
+                let mut expected = Volume::new(grid).unwrap();
+                voxelize_at_once(&Painter::new(Instructions::Best.level(), &job), &lattice, &mut expected);
+                let (backend, other) = (CpuBackend::with_threads(3).unwrap(), CpuBackend::with_threads(2).unwrap());
+                let check = || {
+                    let mut volume = Volume::new(grid).unwrap();
+                    backend.voxelize(&lattice, &job, &mut volume).unwrap();
+                    assert!(volume == expected, "{mode}, {resolution}");
+                };
+                std::thread::scope(|scope| {
+                    for _ in 0..2 {
+                        scope.spawn(check);
+                        scope.spawn(|| backend.install(check));
+                        scope.spawn(|| other.install(check));
+                    }
+                });
+            }
         }
     }
 

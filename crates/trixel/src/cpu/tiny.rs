@@ -415,6 +415,7 @@ pub(super) fn cross<V: Simd, const AXES: usize>(e: &[[f64x8<V>; AXES]; 3], i: us
 mod tests {
     use super::*;
     use crate::conformance::random::{Placement, Random, triangle};
+    use crate::cpu::instructions::{Instructions, fuses};
     use crate::cpu::rule::{Conservative, Thin};
     use crate::cpu::triangles::LANES;
 
@@ -578,38 +579,64 @@ mod tests {
 
     #[test]
     fn sure_cubes_give_what_the_exact_tests_do() {
-        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => {
-            sure_cubes_are_exact::<_, _, 2>(simd, &Conservative);
-            sure_cubes_are_exact::<_, _, 3>(simd, &Conservative);
-            sure_cubes_are_exact::<_, _, 2>(simd, &Thin);
-            sure_cubes_are_exact::<_, _, 3>(simd, &Thin);
-        });
+        for level in Instructions::ALL {
+            fearless_simd::dispatch!(level.level(), simd => {
+                sure_cubes_are_exact::<_, _, 2>(simd, &Conservative);
+                sure_cubes_are_exact::<_, _, 3>(simd, &Conservative);
+                sure_cubes_are_exact::<_, _, 2>(simd, &Thin);
+                sure_cubes_are_exact::<_, _, 3>(simd, &Thin);
+            });
+        }
     }
 
     #[test]
     fn octants_give_what_the_exact_tests_do() {
-        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => octants_are_exact(simd));
+        for level in Instructions::ALL {
+            fearless_simd::dispatch!(level.level(), simd => octants_are_exact(simd));
+        }
     }
 
     #[test]
     fn the_filter_doubts_whatever_it_may_get_wrong() {
-        let shares = fearless_simd::dispatch!(fearless_simd::Level::new(), simd => [
-            decided::<_, _, 2, false>(simd, &Conservative),
-            decided::<_, _, 3, false>(simd, &Conservative),
-            decided::<_, _, 2, false>(simd, &Thin),
-            decided::<_, _, 3, false>(simd, &Thin),
-            decided::<_, _, 2, true>(simd, &Conservative),
-            decided::<_, _, 3, true>(simd, &Conservative),
-            decided::<_, _, 2, true>(simd, &Thin),
-            decided::<_, _, 3, true>(simd, &Thin),
-            decided_in_layers::<_, _, 3>(simd, &Conservative),
-            decided_in_layers::<_, _, 2>(simd, &Thin),
-            decided_in_layers::<_, _, 3>(simd, &Thin),
-        ]);
-        // Of five placements, one has no ties and the others little else.
-        assert!(shares.iter().all(|share| (0.15..0.9).contains(share)), "{shares:?}");
-        for fast in 0..4 {
-            assert!(shares[fast] < shares[fast + 4], "{shares:?}");
+        for level in Instructions::ALL {
+            let shares = fearless_simd::dispatch!(level.level(), simd => [
+                decided::<_, _, 2, false>(simd, &Conservative),
+                decided::<_, _, 3, false>(simd, &Conservative),
+                decided::<_, _, 2, false>(simd, &Thin),
+                decided::<_, _, 3, false>(simd, &Thin),
+                decided::<_, _, 2, true>(simd, &Conservative),
+                decided::<_, _, 3, true>(simd, &Conservative),
+                decided::<_, _, 2, true>(simd, &Thin),
+                decided::<_, _, 3, true>(simd, &Thin),
+                decided_in_layers::<_, _, 3>(simd, &Conservative),
+                decided_in_layers::<_, _, 2>(simd, &Thin),
+                decided_in_layers::<_, _, 3>(simd, &Thin),
+            ]);
+            // Of five placements, one has no ties and the others little else.
+            assert!(shares.iter().all(|share| (0.15..0.9).contains(share)), "{level:?}, {shares:?}");
+            for fast in 0..4 {
+                assert!(shares[fast] < shares[fast + 4], "{level:?}, {shares:?}");
+            }
         }
+    }
+
+    /// Nothing is in doubt because it lies on the side of a voxel.
+    #[test]
+    fn what_is_on_sides_of_voxels_is_decided() {
+        const S: i32 = STEPS_PER_VOXEL as i32;
+        let corners = [[S + 7, S + 9, S], [2 * S - 5, S + 9, S], [S + 7, 2 * S + 777, S]];
+        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => {
+            for turn in 0..3 {
+                let rows = corners.map(|corner| [0, 1, 2].map(|i| [corner[(i + turn) % 3]; LANES]));
+                let corners = vectors(simd, &rows);
+                let boxes = Boxes::new(simd, &corners);
+                let v = corners.floats(middles(&boxes.low, 2), PER_HALF);
+                let longest = boxes.longest.to_float::<f32x16<_>>() * PER_HALF;
+                let filtered = filter::cuboids::<_, _, 2, 2, 2, true>(simd, &Thin, &v, longest);
+                if fuses(simd) {
+                    assert_eq!(filtered.doubtful, 0, "{turn}");
+                }
+            }
+        });
     }
 }
