@@ -25,7 +25,7 @@
 
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
 
-use super::filter::{Normal, UNIT, between, faces_axis};
+use super::filter::{FAR, Normal, UNIT, along_axis, between, faces_axis};
 use super::instructions::fuses;
 use super::kernel::NearClip;
 use super::rows::{Rows, exchange};
@@ -40,8 +40,6 @@ const EDGE_ERROR: f32 = 64.0 * UNIT;
 const PLANE_ERROR: f32 = 64.0 * UNIT;
 /// Instead of a normal's part along z that is 0: so small that bounds are beyond all voxels.
 const NO_PART: f32 = 1e-30;
-/// Beyond any voxel.
-const FAR: f32 = 1e9;
 
 /// Triangles whose boxes are of at most so many columns along the longer and along the shorter side go together, because all
 /// of a vector take as long as the largest.
@@ -190,9 +188,9 @@ impl<V: Simd> EdgeBound<V> {
         let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
         let error = (n[0].abs() + n[1].abs()) * share;
         let at_origin = (-n[0]).mul_add(v[0], (-n[1]).mul_add(v[1], reach));
-        let along_axis = n[0].abs().min(n[1].abs()).simd_eq(zero);
-        let at_origin = along_axis.select(f32x16::splat(simd, FAR), at_origin);
-        let n_z = along_axis.select(one, n[1]);
+        let along = along_axis(n[0].abs(), n[1].abs());
+        let at_origin = along.select(f32x16::splat(simd, FAR), at_origin);
+        let n_z = along.select(one, n[1]);
         let per_z = one / n_z.abs();
         Self {
             start: (at_origin + error) * per_z,
@@ -278,9 +276,9 @@ fn send<V: Simd, R: SurfaceRule>(
     for k in 0..3 {
         let (na, nb) = (-(e[k][1] * side), e[k][0] * side);
         let reach = rule.centre_reach(lengths[k][1], lengths[k][0]) * 0.5;
-        let along_axis = lengths[k][0].min(lengths[k][1]).simd_eq(zero);
+        let along = along_axis(lengths[k][0], lengths[k][1]);
         let at_origin = (-na).mul_add(v[k][0], (-nb).mul_add(v[k][1], reach));
-        xy[k] = [along_axis.select(f32x16::splat(simd, FAR), at_origin), na, nb];
+        xy[k] = [along.select(f32x16::splat(simd, FAR), at_origin), na, nb];
     }
     // The projections to yz and zx.
     let side = one.copysign(n[0]);

@@ -20,7 +20,7 @@
 //! half a voxel, and where there is an area, the third corner is on its inner side, and where there is none, on it. So does a point.
 //! A plane across an axis likewise excludes nothing inside the box, nor does a normal that is 0. Who looks at voxels in boxes
 //! alone can pass over all of these (`SURER`): in meshes whose edges are on the sides of voxels, they are most of what is in
-//! doubt. Looking for them at once would take longer than it saves.
+//! doubt. They are looked for only where there is some.
 
 use fearless_simd::{Simd, SimdFloat, f32x16, i32x16, mask32x16, prelude::*};
 
@@ -41,7 +41,7 @@ const PLANE_DOUBT: f32 = 256.0 * UNIT;
 /// A share of its products by which a component of the normal may be off.
 const NORMAL_DOUBT: f32 = 8.0 * UNIT;
 /// Beyond any voxel.
-const FAR: f32 = 1e9;
+pub(super) const FAR: f32 = 1e9;
 /// The most by which a sum or product is off, relative to it.
 pub(super) const UNIT: f32 = 1.0 / (1 << 24) as f32;
 
@@ -282,7 +282,7 @@ impl<V: Simd> Tests<V> {
             let (la, lb) = (e[k][0].abs(), e[k][1].abs());
             let mut reach = rule.centre_reach(la, lb);
             if SURER {
-                reach = la.min(lb).simd_eq(zero).select(f32x16::splat(simd, FAR), reach);
+                reach = along_axis(la, lb).select(f32x16::splat(simd, FAR), reach);
             } else {
                 reach = reach.max(self.edge_doubt);
             }
@@ -318,6 +318,12 @@ pub(super) fn determinant<V: Simd, const AXES: usize>(
     let product = a[j] * b[i];
     let lost = a[j].mul_sub(b[i], product);
     a[i].mul_sub(b[j], product) - lost
+}
+
+/// Where an edge, of which a projection's absolute components are given, is along an axis or a point.
+#[inline(always)]
+pub(super) fn along_axis<V: Simd>(la: f32x16<V>, lb: f32x16<V>) -> mask32x16<V> {
+    la.min(lb).simd_le(0.0)
 }
 
 /// Where a normal, of which the absolute components are given, is along an axis or 0.

@@ -79,8 +79,8 @@ pub struct ThreadsError {
 
 impl CpuBackend {
     /// A backend with a pool of `threads` threads of its own. ([`CpuBackend::default`] uses rayon's global one.) A thread that
-    /// calls [`Backend::voxelize`] works too, with one less of the pool's, so callers at the same time do not wait for each
-    /// other; whatever else is asked for runs in the pool alone.
+    /// calls [`Backend::voxelize`] works too, with one less of the pool's, so several callers at the same time use more threads
+    /// than that; whatever else is asked for runs in the pool alone.
     ///
     /// # Errors
     /// When the system refuses to start them.
@@ -102,7 +102,7 @@ impl CpuBackend {
     #[must_use]
     pub fn threads(&self) -> usize {
         #[cfg(feature = "threads")]
-        return self.pool.as_ref().map_or_else(rayon::current_num_threads, rayon::ThreadPool::current_num_threads);
+        return self.crew().count();
         #[cfg(not(feature = "threads"))]
         1
     }
@@ -163,6 +163,11 @@ impl CpuBackend {
         Ok(strategy)
     }
 
+    #[cfg(feature = "threads")]
+    fn crew(&self) -> crew::Crew<'_> {
+        crew::Crew::new(self.pool.as_ref())
+    }
+
     /// Runs `work` where its parallel loops use this backend's threads.
     pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
         #[cfg(feature = "threads")]
@@ -194,7 +199,7 @@ impl Backend for CpuBackend {
             volume,
             &self.spare,
             #[cfg(feature = "threads")]
-            &crew::Crew::new(self.pool.as_ref()),
+            &self.crew(),
         );
         Ok(strategy)
     }
