@@ -6,7 +6,7 @@
 //!
 //! - Edges `e` are exact, with `|e| <= m`. A component of the normal, `p - q` of two products, is off by at most
 //!   `u (|p| + |q| + |p - q|)`, so that its sign is right from `8 u (|p| + |q|)` on; where products and
-//!   sums are fused, it can be found with the right sign always ([`determinant`]).
+//!   sums are fused, it is found with the right sign always ([`determinant`]).
 //! - An edge function is `e x v + reach + e x p`, of which only sums and products of two are rounded: off by less than
 //!   `64 u m`.
 //! - The plane's term, `N . v + N . p` against its reach, is off by less than `256 u m^2`.
@@ -107,15 +107,11 @@ pub(super) fn cuboids<V: Simd, R: SurfaceRule, const A: usize, const B: usize, c
     let mut tests = Tests::new(simd, longest);
     let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
     let normal = &mut tests.normal;
-    let mut n = [normal.across(&e, 1, 2), normal.across(&e, 2, 0), normal.across(&e, 0, 1)];
-    if fuses(simd) && (SURER || normal.doubtful(simd) != 0) {
-        *normal = Normal::new(simd);
-        n = [
-            normal.surely_across(simd, &e, 1, 2),
-            normal.surely_across(simd, &e, 2, 0),
-            normal.surely_across(simd, &e, 0, 1),
-        ];
-    }
+    let n = [
+        normal.surely_across(simd, &e, 1, 2),
+        normal.surely_across(simd, &e, 2, 0),
+        normal.surely_across(simd, &e, 0, 1),
+    ];
     let cells = &Cuboid::<A, B, C>::CELLS;
     let voxels = tests.plane::<R, A, B, C, SURER>(simd, rule, n, v[0])
         & tests.edges::<R, B, C, SURER>(simd, rule, &Projection::new(v, &e, 1, 2, n[0]), &cells[0])
@@ -134,7 +130,7 @@ pub(super) fn layers<V: Simd, R: SurfaceRule, const SIDE: usize>(
 ) -> Filtered<V> {
     let mut tests = Tests::new(simd, longest);
     let e = [between(v[0], v[1]), between(v[1], v[2]), between(v[2], v[0])];
-    let area = tests.normal.across(&e, 0, 1);
+    let area = tests.normal.surely_across(simd, &e, 0, 1);
     let cells = &Cuboid::<SIDE, SIDE, 1>::CELLS[2];
     let voxels = tests.edges::<R, SIDE, SIDE, false>(simd, rule, &Projection { v: *v, e, area }, cells);
     Filtered { voxels, doubtful: tests.doubtful(simd) }
@@ -183,7 +179,7 @@ impl<V: Simd> Normal<V> {
         n
     }
 
-    /// [`Self::across`], with the right sign wherever products and sums are fused: as quick, but later.
+    /// [`Self::across`], with the right sign wherever products and sums are fused: later, but nothing is left to be in doubt.
     #[inline(always)]
     pub(super) fn surely_across<const AXES: usize>(
         &mut self,
@@ -249,11 +245,12 @@ impl<V: Simd> Tests<V> {
         }
         let at_middle = n[2].mul_add(v[2], n[1].mul_add(v[1], n[0] * v[0]));
         for x in 0..A {
-            let at_x = n[0] * centre::<A>(x) - at_middle;
+            // Against the normal, which is as good: only how far it is counts.
+            let at_x = moved(at_middle, n[0], -centre::<A>(x));
             for y in 0..B {
-                let at_y = n[1] * centre::<B>(y) + at_x;
+                let at_y = moved(at_x, n[1], -centre::<B>(y));
                 for z in 0..C {
-                    let at = n[2] * centre::<C>(z) + at_y;
+                    let at = moved(at_y, n[2], -centre::<C>(z));
                     let within = reach - at.abs();
                     self.plane = self.plane.min(within.abs());
                     let bits = bit::<B, C>(x, y, z);
@@ -289,9 +286,9 @@ impl<V: Simd> Tests<V> {
             let (ea, eb) = (e[k][0] * side, e[k][1] * side);
             let at_middle = (-ea).mul_add(v[k][1], eb.mul_add(v[k][0], reach));
             for a in 0..A {
-                let at_a = at_middle - eb * centre::<A>(a);
+                let at_a = moved(at_middle, eb, -centre::<A>(a));
                 for b in 0..B {
-                    let at = ea * centre::<B>(b) + at_a;
+                    let at = moved(at_a, ea, centre::<B>(b));
                     least[a][b] = if k == 0 { at } else { least[a][b].min(at) };
                 }
             }
@@ -330,6 +327,12 @@ pub(super) fn along_axis<V: Simd>(la: f32x16<V>, lb: f32x16<V>) -> mask32x16<V> 
 #[inline(always)]
 pub(super) fn faces_axis<V: Simd>(n: [f32x16<V>; 3]) -> mask32x16<V> {
     (n[0] + n[1]).min(n[1] + n[2]).min(n[2] + n[0]).simd_le(0.0)
+}
+
+/// `at + step by`, where the compiler knows `by`, but must not leave out by itself what is times 0.
+#[inline(always)]
+fn moved<V: Simd>(at: f32x16<V>, step: f32x16<V>, by: f32) -> f32x16<V> {
+    if by == 0.0 { at } else { step * by + at }
 }
 
 /// The centre of the `i`th voxel along a side.

@@ -332,12 +332,6 @@ fn for_each_vector<'a, V: Simd, S: Sink>(
         let mut start = 0;
         while start < triangles.len() {
             let count = triangles.load(start, base, &mut block);
-            if sink.prefetches() {
-                for first in (0..count).step_by(LANES) {
-                    let [low, _] = block.vectors(simd, first).boxes();
-                    sink.prefetch(&low, base);
-                }
-            }
             let mut first = 0;
             while first < count {
                 let lanes = Lanes::MAX >> (64 - (count - first).min(LANES));
@@ -391,7 +385,7 @@ impl<V: Simd> NearClip<V> {
 
     /// The lanes whose boxes are inside the clip along x and y.
     #[inline(always)]
-    fn holds_xy(&self, low: &[i32x16<V>; 3], high: &[i32x16<V>; 3]) -> u64 {
+    pub(super) fn holds_xy(&self, low: &[i32x16<V>; 3], high: &[i32x16<V>; 3]) -> u64 {
         let x = low[0].simd_ge(self.low[0]) & high[0].simd_le(self.high[0]);
         (x & low[1].simd_ge(self.low[1]) & high[1].simd_le(self.high[1])).to_bitmask()
     }

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use fearless_simd::{Simd, i32x16, prelude::*};
+use fearless_simd::{Simd, i32x16, i64x8, prelude::*};
 
-use super::sink::{ColumnSink, CubeSink, InWords, Place, Sink, Slab};
+use super::sink::{ColumnSink, CubeSink, Place, Sink, Slab};
 use super::triangles::{LANES, Lanes};
 use crate::volume::WORD_BITS;
 
@@ -315,6 +315,15 @@ fn paint_cube<const SIDE: usize>(words: &mut [u64], steps: Steps, first: isize, 
     }
 }
 
+/// Where cubes are in the grid.
+pub(super) struct PlaceInGrid<V: Simd> {
+    x: i32x16<V>,
+    /// The word and the shift of the low corner: outside the grid, past its end, below 0, or a word for which no bit will be
+    /// set.
+    words: [i64x8<V>; 2],
+    shifts: i32x16<V>,
+}
+
 impl ColumnSink for Outbox<'_> {
     fn place<V: Simd>(&self, low: &[i32x16<V>; 3], _base: [i64; 3]) -> Place<V> {
         Place { column: low[0], z: low[2], row: 0 }
@@ -329,11 +338,20 @@ impl ColumnSink for Outbox<'_> {
 }
 
 impl CubeSink for Outbox<'_> {
-    type Places<V: Simd> = InWords<V>;
+    type Places<V: Simd> = PlaceInGrid<V>;
 
     #[inline(always)]
-    fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> InWords<V> {
-        InWords::new(low, base, [0; 3], self.cuts.columns, self.cuts.column_words)
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        reason = "all in or near a grid, of at most 2^15 voxels along an axis"
+    )]
+    fn places<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) -> PlaceInGrid<V> {
+        let Cuts { columns, column_words, .. } = *self.cuts;
+        let [x, y, z] = [low[0] + base[0] as i32, low[1] + base[1] as i32, low[2] + base[2] as i32];
+        let (first, second) = (x * columns as i32 + y).widening_mul(column_words as i32);
+        let (above_first, above_second) = (z >> SHIFT_BITS).widen();
+        PlaceInGrid { x, words: [first + above_first, second + above_second], shifts: z & (WORD_BITS as i32 - 1) }
     }
 
     #[inline(always)]
@@ -342,7 +360,13 @@ impl CubeSink for Outbox<'_> {
         clippy::cast_sign_loss,
         reason = "places as in `place`; an x below 0 is too large then"
     )]
-    fn cubes<V: Simd, const SIDE: usize>(&mut self, _simd: V, at: &InWords<V>, voxels: i32x16<V>, mut lanes: Lanes) {
+    fn cubes<V: Simd, const SIDE: usize>(
+        &mut self,
+        _simd: V,
+        at: &PlaceInGrid<V>,
+        voxels: i32x16<V>,
+        mut lanes: Lanes,
+    ) {
         let bias = self.cuts.bias() as i64;
         let (first, second) = at.shifts.widen();
         let places = [(at.words[0] + bias) << SHIFT_BITS | first, (at.words[1] + bias) << SHIFT_BITS | second];

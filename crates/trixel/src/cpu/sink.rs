@@ -1,6 +1,6 @@
 //! Where the kernel's runs go: bits of a slab of columns.
 
-use fearless_simd::{Simd, i32x16, i64x8, mask32x16, prelude::*};
+use fearless_simd::{Simd, i32x16, mask32x16, prelude::*};
 
 use super::instructions::compresses;
 use super::kernel::set_bits;
@@ -34,16 +34,6 @@ pub(super) trait Sink {
     #[inline(always)]
     fn leave(&mut self, _number: usize, _x: [i64; 2], _y: i64) {}
 
-    /// Whether [`Self::prefetch`] is of use.
-    #[inline(always)]
-    fn prefetches(&self) -> bool {
-        false
-    }
-
-    /// Asks for the memory of small cubes, whose low corners are seen from the voxel `base`.
-    #[inline(always)]
-    fn prefetch<V: Simd>(&self, _low: &[i32x16<V>; 3], _base: [i64; 3]) {}
-
     /// Whether it should not be given more for now.
     #[inline(always)]
     fn is_full(&self) -> bool {
@@ -75,47 +65,6 @@ pub(super) trait CubeSink: ColumnSink {
     /// Voxels of cubes of `SIDE` in `lanes`: those `(x, y, z)` from the corner whose bit `(SIDE x + y) SIDE + z` is set, all
     /// inside the clip.
     fn cubes<V: Simd, const SIDE: usize>(&mut self, simd: V, places: &Self::Places<V>, voxels: i32x16<V>, lanes: Lanes);
-}
-
-/// Where voxels are among a piece's words.
-pub(super) struct InWords<V: Simd> {
-    /// Along x.
-    #[cfg(feature = "threads")]
-    pub(super) x: i32x16<V>,
-    /// Outside the piece: past its end, below 0, or a word for which no bit will be set.
-    pub(super) words: [i64x8<V>; 2],
-    #[cfg(feature = "threads")]
-    pub(super) shifts: i32x16<V>,
-}
-
-impl<V: Simd> InWords<V> {
-    /// Voxels seen from `base`, in a piece that starts at a voxel, for its columns along y and the words of a column.
-    #[inline(always)]
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_possible_wrap,
-        reason = "all in or near a grid, of at most 2^15 voxels along an axis"
-    )]
-    pub(super) fn new(
-        voxels: &[i32x16<V>; 3],
-        base: [i64; 3],
-        start: [i64; 3],
-        columns: usize,
-        column_words: usize,
-    ) -> Self {
-        let move_by = |i: usize| (base[i] - start[i]) as i32;
-        let at = [voxels[0] + move_by(0), voxels[1] + move_by(1), voxels[2] + move_by(2)];
-        let column = at[0] * columns as i32 + at[1];
-        let (first, second) = column.widening_mul(column_words as i32);
-        let (above_first, above_second) = (at[2] >> WORD_SHIFT).widen();
-        Self {
-            #[cfg(feature = "threads")]
-            x: at[0],
-            words: [first + above_first, second + above_second],
-            #[cfg(feature = "threads")]
-            shifts: at[2] & (WORD_BITS as i32 - 1),
-        }
-    }
 }
 
 /// Where voxels are in a piece.
@@ -163,6 +112,8 @@ pub(super) struct SetRuns<'a> {
     slab: Slab<'a>,
     /// By the number of a word: the bits' shift in it, in [`WORD_SHIFT`] bits, and above it the bits.
     in_words: Parts,
+    /// Those before them, of which the words were asked for.
+    asked_for: Parts,
     /// By the number of a column: the bits, in [`MOST_BITS`] bits, and above them the voxel of the lowest.
     in_columns: Parts,
 }
@@ -216,19 +167,37 @@ impl Parts {
 
 impl<'a> SetRuns<'a> {
     pub(super) fn new(slab: Slab<'a>) -> Self {
-        Self { slab, in_words: Parts::NONE, in_columns: Parts::NONE }
+        Self { slab, in_words: Parts::NONE, asked_for: Parts::NONE, in_columns: Parts::NONE }
     }
 
-    /// Sets the parts that wait.
+    /// Asks for the words of the parts that wait, and sets those before them: or all, if `all` or if it does not pay to ask.
     #[inline(never)]
-    fn set_in_words<V: Simd>(&mut self, simd: V) {
+    fn set_in_words<V: Simd>(&mut self, simd: V, all: bool) {
         simd.vectorize(
             #[inline(always)]
             || {
-                let words = &mut *self.slab.words;
-                for (word, bits) in self.in_words.take() {
-                    words[word] |= u64::from(bits >> WORD_SHIFT) << (bits % WORD_BITS);
+                let Self { slab: Slab { words, .. }, in_words, asked_for, .. } = self;
+                if all || !asks(words) {
+                    for (word, bits) in asked_for.take() {
+                        set_in_word(words, word, bits);
+                    }
+                    for (word, bits) in in_words.take() {
+                        set_in_word(words, word, bits);
+                    }
+                    return;
                 }
+                // By turns, because only so many words can be on their way.
+                let mut next = in_words.places[..FULL].iter();
+                for (word, bits) in asked_for.take() {
+                    if let Some(&next) = next.next() {
+                        prefetch(words, next.cast_unsigned() as usize);
+                    }
+                    set_in_word(words, word, bits);
+                }
+                for &next in next {
+                    prefetch(words, next.cast_unsigned() as usize);
+                }
+                std::mem::swap(in_words, asked_for);
             },
         );
     }
@@ -279,6 +248,19 @@ impl<'a> SetRuns<'a> {
     }
 }
 
+/// Sets a part in a word.
+#[inline(always)]
+fn set_in_word(words: &mut [u64], word: usize, bits: u32) {
+    words[word] |= u64::from(bits >> WORD_SHIFT) << (bits % WORD_BITS);
+}
+
+/// Whether it pays to ask for words before they are set.
+fn asks(words: &[u64]) -> bool {
+    /// Words that come quickly enough: 5 MiB, measured; in tests, so few that some grids have more.
+    const NEAR: usize = if cfg!(test) { 1 << 9 } else { 5 << 17 };
+    prefetch::POSSIBLE && words.len() > NEAR
+}
+
 /// The bits of a column of cubes of `SIDE`.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "at most 24")]
@@ -287,24 +269,6 @@ fn bits_of_column<V: Simd, const SIDE: usize>(voxels: i32x16<V>, x: usize, y: us
 }
 
 impl Sink for SetRuns<'_> {
-    #[inline(always)]
-    fn prefetches(&self) -> bool {
-        /// Words that come quickly enough: 5 MiB, measured.
-        const NEAR: usize = 5 << 17;
-        prefetch::POSSIBLE && self.slab.words.len() > NEAR
-    }
-
-    #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an address, whatever it is")]
-    fn prefetch<V: Simd>(&self, low: &[i32x16<V>; 3], base: [i64; 3]) {
-        let InWords { words, .. } = InWords::new(low, base, self.slab.start, self.slab.columns, self.slab.column_words);
-        // The columns beside are near enough.
-        for &at in [*words[0], *words[1]].as_flattened() {
-            prefetch(self.slab.words, at as usize);
-            prefetch(self.slab.words, (at as usize).wrapping_add(self.slab.layer()));
-        }
-    }
-
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
     fn run(&mut self, x: i64, y: i64, from: i64, to: i64) {
@@ -389,7 +353,7 @@ impl ColumnSink for SetRuns<'_> {
 
     #[inline(always)]
     fn finish<V: Simd>(&mut self, simd: V) {
-        self.set_in_words(simd);
+        self.set_in_words(simd, true);
         self.set_in_columns(simd);
     }
 }
@@ -435,10 +399,16 @@ impl CubeSink for SetRuns<'_> {
         let [layer, beside] = [self.slab.layer() as i32, self.slab.column_words as i32];
         for x in 0..SIDE {
             for y in 0..SIDE {
-                let bits = bits_of_column::<V, SIDE>(voxels, x, y);
+                let first = ((SIDE * x + y) * SIDE) as u32;
+                let column = (1 << SIDE) - 1;
+                // At once to above the shift.
+                let bits =
+                    if first < WORD_SHIFT { voxels << (WORD_SHIFT - first) } else { voxels >> (first - WORD_SHIFT) };
+                let bits = bits & column << WORD_SHIFT | shift;
+                let some = (voxels & column << first).simd_gt(none);
                 let word = word + (x as i32 * layer + y as i32 * beside);
-                if self.in_words.push(simd, word, bits << WORD_SHIFT | shift, bits.simd_gt(none)) {
-                    self.set_in_words(simd);
+                if self.in_words.push(simd, word, bits, some) {
+                    self.set_in_words(simd, false);
                 }
             }
         }

@@ -24,6 +24,7 @@ const PER_HALF: f32 = 2.0 / STEPS_PER_VOXEL as f32;
 /// The boxes of the triangles in all lanes.
 struct Boxes<V: Simd> {
     low: [i32x16<V>; 3],
+    high: [i32x16<V>; 3],
     /// The highest voxel, from the lowest.
     extent: [i32x16<V>; 3],
     /// The longest side, in steps.
@@ -34,14 +35,15 @@ impl<V: Simd> Boxes<V> {
     #[inline(always)]
     fn new(simd: V, corners: &Vectors<V>) -> Self {
         let zero = i32x16::splat(simd, 0);
-        let (mut low, mut extent, mut longest) = ([zero; 3], [zero; 3], zero);
+        let (mut low, mut high, mut extent, mut longest) = ([zero; 3], [zero; 3], [zero; 3], zero);
         for i in 0..3 {
             let (least, most) = (corners.least(i), corners.most(i));
             low[i] = (least - 1) >> STEP_BITS;
-            extent[i] = (most >> STEP_BITS) - low[i];
-            longest = longest.max(most - least);
+            high[i] = most >> STEP_BITS;
+            extent[i] = high[i] - low[i];
+            longest = if i == 0 { most - least } else { longest.max(most - least) };
         }
-        Self { low, extent, longest }
+        Self { low, high, extent, longest }
     }
 
     /// The lanes that have voxels inside the clip in each layer of cubes of 2^3.
@@ -55,20 +57,35 @@ impl<V: Simd> Boxes<V> {
         layers
     }
 
-    /// Those of the voxels of cubes of `SIDE` that are inside the boxes and the clip, where boxes meet it.
+    /// Whether any of the boxes in `lanes`, which are inside the clip along z, is not along x or y.
+    #[inline(always)]
+    fn meets_side(&self, clip: &NearClip<V>, lanes: Lanes) -> bool {
+        clip.holds_xy(&self.low, &self.high) & lanes != lanes
+    }
+
+    /// Those of the voxels of cubes of `SIDE` that are inside the boxes and the clip, where boxes meet it and are inside
+    /// along z.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "at most 3")]
-    fn keep<const SIDE: usize>(&self, clip: &NearClip<V>, mut voxels: i32x16<V>) -> i32x16<V> {
+    fn keep<const SIDE: usize>(&self, clip: &NearClip<V>, mut voxels: i32x16<V>, lanes: Lanes) -> i32x16<V> {
         for axis in 0..3 {
-            let from = clip.low[axis] - self.low[axis];
-            let to = (clip.high[axis] - self.low[axis]).min(self.extent[axis]);
-            for (i, &layer) in (0..).zip(&Cube::<SIDE>::LAYERS[axis][..SIDE]) {
-                // The last layer is not before all that is inside, nor the first behind it.
-                if i + 1 < SIDE as i32 {
-                    voxels = from.simd_gt(i).select(voxels & !layer, voxels);
-                }
-                if i > 0 {
-                    voxels = to.simd_lt(i).select(voxels & !layer, voxels);
+            for i in 1..SIDE {
+                let layer = Cube::<SIDE>::LAYERS[axis][i];
+                voxels = self.extent[axis].simd_lt(i as i32).select(voxels & !layer, voxels);
+            }
+        }
+        if self.meets_side(clip, lanes) {
+            for axis in 0..2 {
+                let from = clip.low[axis] - self.low[axis];
+                let to = clip.high[axis] - self.low[axis];
+                for (i, &layer) in (0..).zip(&Cube::<SIDE>::LAYERS[axis][..SIDE]) {
+                    // The last layer is not before all that is inside, nor the first behind it.
+                    if i + 1 < SIDE as i32 {
+                        voxels = from.simd_gt(i).select(voxels & !layer, voxels);
+                    }
+                    if i > 0 {
+                        voxels = to.simd_lt(i).select(voxels & !layer, voxels);
+                    }
                 }
             }
         }
@@ -130,7 +147,7 @@ pub(super) fn send_cubes<V: Simd, R: SurfaceRule, const SIDE: usize>(
     if doubtful & lanes != 0 {
         voxels = sure_cubes::<_, _, SIDE>(simd, rule, &corners.stored(), lanes);
     }
-    sink.cubes::<_, SIDE>(simd, &places, boxes.keep::<SIDE>(clip, voxels), lanes);
+    sink.cubes::<_, SIDE>(simd, &places, boxes.keep::<SIDE>(clip, voxels, lanes), lanes);
 }
 
 /// Sends the voxels of the triangles in `lanes`, whose boxes have at most two voxels along each axis.
@@ -203,7 +220,7 @@ pub(super) fn flats<V: Simd, R: SurfaceRule, const SIDE: usize>(
     if doubtful & lanes != 0 {
         voxels = sure_cubes::<_, _, SIDE>(simd, rule, &corners.stored(), lanes);
     }
-    sink.cubes::<_, SIDE>(simd, &places, boxes.keep::<SIDE>(clip, voxels), lanes);
+    sink.cubes::<_, SIDE>(simd, &places, boxes.keep::<SIDE>(clip, voxels, lanes), lanes);
 }
 
 /// The voxels of cubes of `SIDE` that triangles meet whose boxes are one layer: of those inside the boxes. A row of voxels is
@@ -420,6 +437,7 @@ mod tests {
     use crate::cpu::triangles::LANES;
 
     const ROUNDS: u32 = 500;
+    const ALL: Lanes = (1 << LANES) - 1;
 
     /// Triangles whose boxes are inside a cube of `side` voxels at the origin: corner, axis, lane.
     fn in_cube(random: &mut Random, round: u32, side: i64) -> [[[i32; LANES]; 3]; 3] {
@@ -473,7 +491,7 @@ mod tests {
     ) -> u32 {
         let all = i32x16::splat(simd, i32::try_from(SIDE).unwrap());
         let clip = NearClip { base: [0; 3], low: [i32x16::splat(simd, 0); 3], high: [all; 3] };
-        let [exact, voxels] = [exact, voxels].map(|voxels| boxes.keep::<SIDE>(&clip, voxels));
+        let [exact, voxels] = [exact, voxels].map(|voxels| boxes.keep::<SIDE>(&clip, voxels, ALL));
         let mut decided = 0;
         for lane in (0..LANES).filter(|lane| doubtful >> lane & 1 == 0) {
             let corners = rows.map(|corner| corner.map(|row| row[lane]));
@@ -546,7 +564,7 @@ mod tests {
             let (zero, one) = (i32x16::splat(simd, 0), i32x16::splat(simd, 1));
             let clip = NearClip { base: [0; 3], low: [clip(), zero, zero], high: [one, clip(), one] };
             let expected = exact_cubes::<_, _, 2>(simd, &Conservative, &corners.stored());
-            let expected = boxes.keep::<2>(&clip, expected);
+            let expected = boxes.keep::<2>(&clip, expected, ALL);
 
             let (middle, layers) = (middles(&boxes.low, 2), boxes.layers(&clip));
             let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;

@@ -74,8 +74,11 @@ impl<'a> Selected<'a> {
             (LatticePositions::Narrow(positions), Which::Range(range)) => {
                 let next = range.start + end;
                 prefetch_block(all, next + BLOCK);
-                for &vertex in all[next..all.len().min(next + BLOCK)].as_flattened() {
-                    prefetch(positions, vertex as usize);
+                // Not corner by corner: the loop would be so short that its place in memory decides how quick it is.
+                for &[a, b, c] in &all[next..all.len().min(next + BLOCK)] {
+                    prefetch(positions, a as usize);
+                    prefetch(positions, b as usize);
+                    prefetch(positions, c as usize);
                 }
                 let all = &all[range.start + start..next];
                 block.fill(all, |&triangle| triangle, |vertex| positions[vertex as usize]);
@@ -242,11 +245,14 @@ impl<V: Simd> Vectors<V> {
         ]
     }
 
-    /// The corners as seen from `origin`, times `scale`, a power of two: exact within 2^24 steps.
+    /// The corners as seen from `origin`, times `scale`, a power of two: exact within 2^22 steps.
     #[inline(always)]
     pub(super) fn floats(&self, origin: [i32x16<V>; 3], scale: f32) -> [[f32x16<V>; 3]; 3] {
+        let bias = scale * BIAS;
+        let bits = bias.to_bits().cast_signed();
+        let origin = [origin[0] - bits, origin[1] - bits, origin[2] - bits];
         let [a, b, c] = self.0;
-        [local(a, origin, scale), local(b, origin, scale), local(c, origin, scale)]
+        [local(a, origin, bias), local(b, origin, bias), local(c, origin, bias)]
     }
 
     /// [`Self::floats`] in two halves of the lanes, wide enough to calculate with.
@@ -265,13 +271,17 @@ impl<V: Simd> Vectors<V> {
     }
 }
 
-/// A corner as seen from `origin`, times `scale`.
+/// The middle of the floats that are 1 apart: what is added to their bits is added to them, so that whole numbers become floats
+/// without a conversion.
+const BIAS: f32 = 3.0 * (1 << 22) as f32;
+
+/// A corner as seen from `origin`, of which the bits of `bias` were subtracted.
 #[inline(always)]
-fn local<V: Simd>(corner: [i32x16<V>; 3], origin: [i32x16<V>; 3], scale: f32) -> [f32x16<V>; 3] {
+fn local<V: Simd>(corner: [i32x16<V>; 3], origin: [i32x16<V>; 3], bias: f32) -> [f32x16<V>; 3] {
     [
-        (corner[0] - origin[0]).to_float::<f32x16<V>>() * scale,
-        (corner[1] - origin[1]).to_float::<f32x16<V>>() * scale,
-        (corner[2] - origin[2]).to_float::<f32x16<V>>() * scale,
+        (corner[0] - origin[0]).bitcast::<f32x16<V>>() - bias,
+        (corner[1] - origin[1]).bitcast::<f32x16<V>>() - bias,
+        (corner[2] - origin[2]).bitcast::<f32x16<V>>() - bias,
     ]
 }
 
