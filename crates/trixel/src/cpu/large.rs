@@ -7,11 +7,11 @@
 
 use fearless_simd::Level;
 
-use super::kernel::{VoxelBox, set_bits};
+use super::kernel::VoxelBox;
 use super::number::{FloorLine, Int, MEDIUM_EXTENT};
 use super::rule::Rule;
 use super::setup::{Constraint, Setup};
-use super::sink::Sink;
+use super::sink::{Sink, turn};
 use super::slanted::{COLUMNS, Ranges, Runs, Slanted};
 
 /// One bound on b that follows a: `low` (b at least) or not (b at most).
@@ -103,23 +103,35 @@ pub(super) fn voxelize<R: Rule>(
 ) {
     let around = VoxelBox::around(triangle);
     let wanted = if R::SURFACE { around } else { VoxelBox::columns(triangle, clip) };
-    let Some(clipped) = &wanted.clipped(clip) else { return };
+    let Some(mut clipped) = wanted.clipped(clip) else { return };
     let extent = around.extent();
+    let (mut triangle, mut base) = (*triangle, around.low);
+    // Rows along the longer side, so that there are few, where it pays: columns are farther apart along x than along y. Centres
+    // on edges are told by x before y, which turning would change.
+    let [along_x, along_y, _] = clipped.extent();
+    let turned = R::SURFACE && along_x > 2 * along_y;
+    if turned {
+        for point in triangle.iter_mut().chain([&mut base, &mut clipped.low, &mut clipped.high]) {
+            point.swap(0, 1);
+        }
+    }
     if extent[0].max(extent[1]).max(extent[2]) <= MEDIUM_EXTENT && rule.fits_small() {
-        runs::<i64, _>(level, rule, triangle, around.low, clipped, sink, scratch);
+        runs::<i64, _>(level, rule, &triangle, base, &clipped, turned, sink, scratch);
     } else {
-        runs::<i128, _>(level, rule, triangle, around.low, clipped, sink, scratch);
+        runs::<i128, _>(level, rule, &triangle, base, &clipped, turned, sink, scratch);
     }
 }
 
-/// [`voxelize`], following lines in integers that hold what is said at [`MEDIUM_EXTENT`].
+/// [`voxelize`], following lines in integers that hold what is said at [`MEDIUM_EXTENT`]; x and y are exchanged if `turned`.
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "a step of the kernel")]
 fn runs<T: Int, R: Rule>(
     level: Level,
     rule: &R,
     triangle: &[[i64; 3]; 3],
     base: [i64; 3],
     clipped: &VoxelBox,
+    turned: bool,
     sink: &mut impl Sink,
     scratch: &mut Scratch,
 ) {
@@ -186,7 +198,8 @@ fn runs<T: Int, R: Rule>(
             for y in y_low..=y_high {
                 let [from, to] = z_by_y.within(to_index(y - low[1]), z);
                 if from <= to {
-                    sink.run(x + base[0], y + base[1], from + base[2], to + base[2]);
+                    let [x, y] = turn(turned, [x + base[0], y + base[1]]);
+                    sink.run(x, y, from + base[2], to + base[2]);
                 }
             }
         }
@@ -209,10 +222,8 @@ fn runs<T: Int, R: Rule>(
                 while first <= y_high {
                     let columns = to_index(first - low[1])..to_index(y_high - low[1]) + 1;
                     let set = slanted.next(level, z_by_y, columns, z, R::TO_TOP, runs);
-                    for i in set_bits(set) {
-                        let (from, to) = (runs.starts[i % COLUMNS], runs.ends[i % COLUMNS]);
-                        sink.run(x + base[0], first + i as i64 + base[1], from + base[2], to + base[2]);
-                    }
+                    let [row_x, row_y] = turn(turned, [x + base[0], first + base[1]]);
+                    sink.row([row_x, row_y, base[2]], turned, set, &runs.starts, &runs.ends);
                     first += COLUMNS as i64;
                 }
             } else {
@@ -223,7 +234,8 @@ fn runs<T: Int, R: Rule>(
                     let from = (top.quotient - thickness + carry).saturate().max(y_from);
                     let to = if R::TO_TOP { z[1] } else { top.quotient.saturate().min(y_to) };
                     if from <= to {
-                        sink.run(x + base[0], y + base[1], from + base[2], to + base[2]);
+                        let [x, y] = turn(turned, [x + base[0], y + base[1]]);
+                        sink.run(x, y, from + base[2], to + base[2]);
                     }
                     top.advance();
                 }

@@ -27,6 +27,16 @@ pub(super) trait Sink {
         });
     }
 
+    /// Runs of the columns of a row from `at` on, along y or, if `turned`, along x: of those whose bit is set in `columns`. The
+    /// z of their ends are seen from `at`.
+    #[inline(always)]
+    fn row(&mut self, at: [i64; 3], turned: bool, columns: u64, from: &Tile, to: &Tile) {
+        for_each_column(columns, |column| {
+            let [x, y] = turn(turned, [0, column as i64]);
+            self.run(at[0] + x, at[1] + y, at[2] + from[column], at[2] + to[column]);
+        });
+    }
+
     /// Whether triangles that are not tiny are left for later.
     const LEAVES: bool = false;
 
@@ -248,6 +258,21 @@ impl<'a> SetRuns<'a> {
     }
 }
 
+/// Sets the voxels of a run in the words of a column.
+#[inline(always)]
+fn set_run(column: &mut [u64], from: u32, to: u32) {
+    let (first, last) = ((from / WORD_BITS) as usize, (to / WORD_BITS) as usize);
+    let from_bits = u64::MAX << (from % WORD_BITS);
+    let to_bits = u64::MAX >> (WORD_BITS - 1 - to % WORD_BITS);
+    if first == last {
+        column[first] |= from_bits & to_bits;
+    } else {
+        column[first] |= from_bits;
+        column[first + 1..last].fill(u64::MAX);
+        column[last] |= to_bits;
+    }
+}
+
 /// Sets a part in a word.
 #[inline(always)]
 fn set_in_word(words: &mut [u64], word: usize, bits: u32) {
@@ -273,17 +298,19 @@ impl Sink for SetRuns<'_> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
     fn run(&mut self, x: i64, y: i64, from: i64, to: i64) {
         let (from, to) = ((from - self.slab.start[2]) as u32, (to - self.slab.start[2]) as u32);
-        let column = self.slab.column(x, y);
-        let (first, last) = ((from / WORD_BITS) as usize, (to / WORD_BITS) as usize);
-        let from_bits = u64::MAX << (from % WORD_BITS);
-        let to_bits = u64::MAX >> (WORD_BITS - 1 - to % WORD_BITS);
-        if first == last {
-            column[first] |= from_bits & to_bits;
-        } else {
-            column[first] |= from_bits;
-            column[first + 1..last].fill(u64::MAX);
-            column[last] |= to_bits;
-        }
+        set_run(self.slab.column(x, y), from, to);
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the slab")]
+    fn row(&mut self, at: [i64; 3], turned: bool, columns: u64, from: &Tile, to: &Tile) {
+        let Slab { words, start, columns: row, column_words } = &mut self.slab;
+        let first = ((at[0] - start[0]) as usize * *row + (at[1] - start[1]) as usize) * *column_words;
+        let step = if turned { *row * *column_words } else { *column_words };
+        let z = at[2] - start[2];
+        for_each_column(columns, |column| {
+            set_run(&mut words[first + column * step..], (from[column] + z) as u32, (to[column] + z) as u32);
+        });
     }
 
     #[inline(always)]

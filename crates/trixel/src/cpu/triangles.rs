@@ -351,3 +351,49 @@ impl Queue {
         self.count = self.count.saturating_sub(first);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conformance::random::Random;
+    use crate::cpu::instructions::Instructions;
+
+    /// Corners become floats exactly, as far from the origin as is allowed and wherever that is.
+    fn floats_are_exact<V: Simd>(simd: V) {
+        const FARTHEST: i64 = 1 << 22;
+        let mut random = Random::new(11);
+        for round in 0..200 {
+            let origin: [i32; 3] = std::array::from_fn(|_| {
+                let ends = i64::from(i32::MAX) - FARTHEST;
+                i32::try_from(random.range(-ends, ends)).unwrap()
+            });
+            let mut from_origin = || {
+                let steps = match round % 4 {
+                    0 => random.range(-1, 1),
+                    1 => [-FARTHEST, FARTHEST][usize::try_from(random.range(0, 1)).unwrap()],
+                    _ => random.range(-FARTHEST, FARTHEST),
+                };
+                i32::try_from(steps).unwrap()
+            };
+            let steps: [[[i32; LANES]; 3]; 3] =
+                std::array::from_fn(|_| std::array::from_fn(|_| std::array::from_fn(|_| from_origin())));
+            let corner = |k: usize| [0, 1, 2].map(|i| i32x16::from_slice(simd, &steps[k][i]) + origin[i]);
+            let corners = Vectors([corner(0), corner(1), corner(2)]);
+            let origin = origin.map(|at| i32x16::splat(simd, at));
+            for scale in [1.0, 2f32.powi(-15), 2f32.powi(-16)] {
+                let floats = corners.floats(origin, scale);
+                for (k, i, lane) in (0..9 * LANES).map(|at| (at / LANES / 3, at / LANES % 3, at % LANES)) {
+                    let expected = f64::from(steps[k][i][lane]) * f64::from(scale);
+                    assert_eq!(f64::from(floats[k][i][lane]), expected, "scale {scale}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn corners_become_floats_exactly() {
+        for level in Instructions::ALL {
+            fearless_simd::dispatch!(level.level(), simd => floats_are_exact(simd));
+        }
+    }
+}
