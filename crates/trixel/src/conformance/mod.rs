@@ -18,7 +18,7 @@ macro_rules! conformance_suite {
     ($name:ident, $backend:expr) => {
         $crate::conformance_suite!(@tests $name, $backend,
             zoo_conservative zoo_thin zoo_solid zoo_sliced
-            random_small random_on_lattice random_degenerate random_large random_huge random_far_outside
+            random_small random_on_lattice random_degenerate random_large random_huge random_elongated random_far_outside
             random_in_cells random_in_cells_beside_far
             sliced_overlap solid_closed_soup huge_dims
             grid_is_overwritten other_grid_is_refused

@@ -158,6 +158,27 @@ pub fn random_huge(backend: &dyn Backend) {
     random(backend, 9, 2, &Placement::ALL, [24, 20, 28], &[300, 5000, 8191, 10_000]);
 }
 
+/// Triangles many times as long along x or y as along the other axes, through grids that are long too: rows of many columns.
+pub fn random_elongated(backend: &dyn Backend) {
+    const SIDE: i64 = 9;
+    let mut random = Random::new(12);
+    for (axis, dims) in [(0, [150, 9, 14]), (1, [9, 150, 14])] {
+        let grid = unit_grid(dims);
+        for stretch in [16, 1000, 200_000] {
+            for placement in Placement::ALL.into_iter().cycle().take(6 * Placement::ALL.len()) {
+                let mut triangle = random::triangle(&mut random, placement, -SIDE / 2, SIDE / 2, SIDE);
+                for corner in &mut triangle {
+                    corner[axis] *= stretch;
+                }
+                for &mode in backend.modes() {
+                    let job = Job::new(grid, mode);
+                    compare(backend, &format!("{placement:?} {triangle:?}"), &lattice_mesh(&[triangle]), &job);
+                }
+            }
+        }
+    }
+}
+
 /// Thousands of triangles, each alone in a cell of one grid, so that none hides behind another; the outermost cells are
 /// cut by the grid's border.
 pub fn random_in_cells(backend: &dyn Backend) {

@@ -318,9 +318,10 @@ fn paint_cube<const SIDE: usize>(words: &mut [u64], steps: Steps, first: isize, 
 /// Where cubes are in the grid.
 pub(super) struct PlaceInGrid<V: Simd> {
     x: i32x16<V>,
-    /// The word and the shift of the low corner: outside the grid, past its end, below 0, or a word for which no bit will be
-    /// set.
+    /// The word of the low corner: of a cube that is partly outside the grid perhaps past its end, or below 0, or one for which
+    /// no bit will be set.
     words: [i64x8<V>; 2],
+    /// The low corner's bit in its word.
     shifts: i32x16<V>,
 }
 

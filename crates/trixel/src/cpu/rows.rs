@@ -24,7 +24,8 @@ use crate::volume::WORD_BITS;
 /// Columns judged at once, and triangles whose tests are found at once.
 const LANES: usize = 8;
 
-/// A number for each column `(x, y)` of eight by eight, at `8 x + y`, or `8 y + x` where x and y are exchanged.
+/// A number for each column `(x, y)` of eight by eight, at `8 x + y`, or `8 y + x` where x and y are exchanged; or for each of
+/// 64 columns of one row.
 pub(super) type Tile = [i64; LANES * LANES];
 
 /// Columns along an axis of the largest box, rounded up to whole vectors.

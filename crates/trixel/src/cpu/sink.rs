@@ -1,5 +1,7 @@
 //! Where the kernel's runs go: bits of a slab of columns.
 
+use std::ops::Range;
+
 use fearless_simd::{Simd, i32x16, mask32x16, prelude::*};
 
 use super::instructions::compresses;
@@ -117,38 +119,42 @@ impl<'a> Slab<'a> {
     }
 }
 
-/// Sets the voxels of a run.
+/// Sets the voxels of runs, and of parts of columns once there are many, or at [`ColumnSink::finish`].
 pub(super) struct SetRuns<'a> {
     slab: Slab<'a>,
     /// By the number of a word: the bits' shift in it, in [`WORD_SHIFT`] bits, and above it the bits.
     in_words: Parts,
-    /// Those before them, of which the words were asked for.
-    asked_for: Parts,
     /// By the number of a column: the bits, in [`MOST_BITS`] bits, and above them the voxel of the lowest.
     in_columns: Parts,
 }
 
-/// Parts of columns that wait, so that the loop that sets them is long.
+/// Parts of columns that wait, so that the loop that sets them is long: in two halves, of which one is filled while the
+/// memory of the other is on its way.
 struct Parts {
-    count: usize,
-    places: [i32; MOST_PARTS],
-    bits: [i32; MOST_PARTS],
+    /// Where the half begins that is filled: 0 or [`HALF`].
+    half: usize,
+    /// Where the next part goes.
+    next: usize,
+    /// How many wait in the other half.
+    asked_for: usize,
+    places: [i32; 2 * HALF],
+    bits: [i32; 2 * HALF],
 }
 
-/// Parts that may wait before all are set.
+/// Parts of a half from which on it takes no more.
 const FULL: usize = 256;
-const MOST_PARTS: usize = FULL + LANES;
+const HALF: usize = FULL + LANES;
 
 /// Voxels of a part of a column at most.
 pub(super) const MOST_BITS: u32 = 16;
 
 impl Parts {
-    const NONE: Self = Self { count: 0, places: [0; MOST_PARTS], bits: [0; MOST_PARTS] };
+    const NONE: Self = Self { half: 0, next: 0, asked_for: 0, places: [0; 2 * HALF], bits: [0; 2 * HALF] };
 
-    /// Adds those in `lanes`; `true` when they are to be set before the next.
+    /// Adds those in `lanes`; `true` when the half takes no more.
     #[inline(always)]
     fn push<V: Simd>(&mut self, simd: V, places: i32x16<V>, bits: i32x16<V>, lanes: mask32x16<V>) -> bool {
-        let mut at = self.count.min(FULL);
+        let mut at = self.next.min(2 * HALF - LANES);
         if compresses(simd) {
             places.compress(lanes).store_slice(&mut self.places[at..at + LANES]);
             bits.compress(lanes).store_slice(&mut self.bits[at..at + LANES]);
@@ -156,70 +162,106 @@ impl Parts {
         } else {
             let (places, bits) = (*places, *bits);
             for lane in set_bits(lanes.to_bitmask()) {
-                let at_most = at.min(MOST_PARTS - 1);
+                let at_most = at.min(2 * HALF - 1);
                 (self.places[at_most], self.bits[at_most]) = (places[lane % LANES], bits[lane % LANES]);
                 at += 1;
             }
         }
-        self.count = at;
-        self.count > FULL
+        self.next = at;
+        at > self.half + FULL
     }
 
-    /// Those that wait, which then do so no longer.
+    /// The half that is filled.
+    #[inline(always)]
+    fn filled(&self) -> Range<usize> {
+        self.half..self.next.min(self.half + HALF)
+    }
+
+    /// The half of which the memory was asked for.
+    #[inline(always)]
+    fn asked_for(&self) -> Range<usize> {
+        let half = HALF - self.half;
+        half..half + self.asked_for
+    }
+
+    /// Those in a part of these, by place.
     #[inline(always)]
     #[expect(clippy::cast_sign_loss, reason = "never below 0")]
-    fn take(&mut self) -> impl Iterator<Item = (usize, u32)> {
-        let count = self.count.min(MOST_PARTS);
-        self.count = 0;
-        self.places[..count].iter().zip(&self.bits[..count]).map(|(&place, &bits)| (place as usize, bits as u32))
+    fn of(&self, range: Range<usize>) -> impl Iterator<Item = (usize, u32)> {
+        self.places[range.clone()].iter().zip(&self.bits[range]).map(|(&place, &bits)| (place as usize, bits as u32))
+    }
+
+    /// The memory of the half that was filled was asked for, and the other's parts are set.
+    #[inline(always)]
+    fn exchange(&mut self) {
+        self.asked_for = self.filled().len();
+        self.half = HALF - self.half;
+        self.next = self.half;
+    }
+
+    /// All are set.
+    #[inline(always)]
+    fn clear(&mut self) {
+        (self.half, self.next, self.asked_for) = (0, 0, 0);
     }
 }
 
 impl<'a> SetRuns<'a> {
     pub(super) fn new(slab: Slab<'a>) -> Self {
-        Self { slab, in_words: Parts::NONE, asked_for: Parts::NONE, in_columns: Parts::NONE }
+        Self { slab, in_words: Parts::NONE, in_columns: Parts::NONE }
     }
 
-    /// Asks for the words of the parts that wait, and sets those before them: or all, if `all` or if it does not pay to ask.
+    /// Asks for the words of the half that is filled, and sets the parts of the other; or sets all, if it does not pay to ask.
     #[inline(never)]
-    fn set_in_words<V: Simd>(&mut self, simd: V, all: bool) {
+    fn ask_for_words<V: Simd>(&mut self, simd: V) {
+        if !asks(self.slab.words) {
+            return self.set_in_words(simd);
+        }
         simd.vectorize(
             #[inline(always)]
             || {
-                let Self { slab: Slab { words, .. }, in_words, asked_for, .. } = self;
-                if all || !asks(words) {
-                    for (word, bits) in asked_for.take() {
-                        set_in_word(words, word, bits);
-                    }
-                    for (word, bits) in in_words.take() {
-                        set_in_word(words, word, bits);
-                    }
-                    return;
-                }
+                let Self { slab: Slab { words, .. }, in_words, .. } = self;
                 // By turns, because only so many words can be on their way.
-                let mut next = in_words.places[..FULL].iter();
-                for (word, bits) in asked_for.take() {
-                    if let Some(&next) = next.next() {
-                        prefetch(words, next.cast_unsigned() as usize);
+                let mut next = in_words.of(in_words.filled());
+                for (word, bits) in in_words.of(in_words.asked_for()) {
+                    if let Some((next, _)) = next.next() {
+                        prefetch(words, next);
                     }
                     set_in_word(words, word, bits);
                 }
-                for &next in next {
-                    prefetch(words, next.cast_unsigned() as usize);
+                for (next, _) in next {
+                    prefetch(words, next);
                 }
-                std::mem::swap(in_words, asked_for);
+                in_words.exchange();
             },
         );
     }
 
-    /// Sets the columns that wait.
+    /// Sets the parts that wait by words.
+    #[inline(never)]
+    fn set_in_words<V: Simd>(&mut self, simd: V) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let Self { slab: Slab { words, .. }, in_words, .. } = self;
+                for half in [in_words.asked_for(), in_words.filled()] {
+                    for (word, bits) in in_words.of(half) {
+                        set_in_word(words, word, bits);
+                    }
+                }
+                in_words.clear();
+            },
+        );
+    }
+
+    /// Sets the parts that wait by columns.
     #[inline(never)]
     fn set_in_columns<V: Simd>(&mut self, simd: V) {
         simd.vectorize(
             #[inline(always)]
             || {
-                let Slab { words, column_words, .. } = &mut self.slab;
-                for (column, bits) in self.in_columns.take() {
+                let Self { slab: Slab { words, column_words, .. }, in_columns, .. } = self;
+                for (column, bits) in in_columns.of(in_columns.filled()) {
                     let (from, bits) = (bits >> MOST_BITS, u64::from(bits % (1 << MOST_BITS)));
                     let word = column * *column_words + (from / WORD_BITS) as usize;
                     words[word] |= bits << (from % WORD_BITS);
@@ -228,6 +270,7 @@ impl<'a> SetRuns<'a> {
                         words[word + 1] |= above;
                     }
                 }
+                in_columns.clear();
             },
         );
     }
@@ -258,7 +301,7 @@ impl<'a> SetRuns<'a> {
     }
 }
 
-/// Sets the voxels of a run in the words of a column.
+/// Sets the voxels of a run in all words of a column.
 #[inline(always)]
 fn set_run(column: &mut [u64], from: u32, to: u32) {
     let (first, last) = ((from / WORD_BITS) as usize, (to / WORD_BITS) as usize);
@@ -309,7 +352,8 @@ impl Sink for SetRuns<'_> {
         let step = if turned { *row * *column_words } else { *column_words };
         let z = at[2] - start[2];
         for_each_column(columns, |column| {
-            set_run(&mut words[first + column * step..], (from[column] + z) as u32, (to[column] + z) as u32);
+            let word = first + column * step;
+            set_run(&mut words[word..word + *column_words], (from[column] + z) as u32, (to[column] + z) as u32);
         });
     }
 
@@ -380,7 +424,7 @@ impl ColumnSink for SetRuns<'_> {
 
     #[inline(always)]
     fn finish<V: Simd>(&mut self, simd: V) {
-        self.set_in_words(simd, true);
+        self.set_in_words(simd);
         self.set_in_columns(simd);
     }
 }
@@ -435,7 +479,7 @@ impl CubeSink for SetRuns<'_> {
                 let some = (voxels & column << first).simd_gt(none);
                 let word = word + (x as i32 * layer + y as i32 * beside);
                 if self.in_words.push(simd, word, bits, some) {
-                    self.set_in_words(simd, false);
+                    self.ask_for_words(simd);
                 }
             }
         }
@@ -482,6 +526,68 @@ pub(super) fn prefix_xor(words: &mut [u64], column_words: usize, nz: u32) {
         }
         if let Some(last) = column.last_mut() {
             *last &= last_bits;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conformance::random::Random;
+    use crate::cpu::instructions::Instructions;
+
+    /// A piece of columns of two words, with so many that words are asked for.
+    const DIMS: [usize; 3] = [25, 40, 128];
+    const START: [i64; 3] = [3, 7, 64];
+
+    /// Sets random cubes of `SIDE`, vector by vector, and in another piece their voxels one by one.
+    fn cubes_are_set<V: Simd, const SIDE: usize>(simd: V, random: &mut Random, vectors: u32) {
+        let column_words = DIMS[2] / WORD_BITS as usize;
+        let mut words = vec![0; DIMS[0] * DIMS[1] * column_words];
+        let mut expected = words.clone();
+        assert!(asks(&words) == prefetch::POSSIBLE && words.len() <= MOST_WORDS);
+        let slab = Slab { words: &mut words, start: START, columns: DIMS[1], column_words };
+        let mut sink = SetRuns::new(slab);
+        let base = [1, 5, 60];
+        for _ in 0..vectors {
+            let mut low = [[0i32; LANES]; 3];
+            let mut voxels = [0i32; LANES];
+            let lanes = random.range(0, (1 << LANES) - 1).cast_unsigned();
+            for lane in 0..LANES {
+                let corner: [usize; 3] = std::array::from_fn(|axis| index(random, DIMS[axis] - SIDE));
+                for axis in 0..3 {
+                    low[axis][lane] = i32::try_from(corner[axis] as i64 + START[axis] - base[axis]).unwrap();
+                }
+                voxels[lane] = i32::try_from(random.range(0, (1 << (SIDE * SIDE * SIDE)) - 1)).unwrap();
+                for voxel in set_bits(voxels[lane].cast_unsigned().into()).filter(|_| lanes >> lane & 1 != 0) {
+                    let [x, y, z] = [voxel / SIDE / SIDE, voxel / SIDE % SIDE, voxel % SIDE];
+                    let (column, z) = ((corner[0] + x) * DIMS[1] + corner[1] + y, corner[2] + z);
+                    expected[column * column_words + z / 64] |= 1 << (z % 64);
+                }
+            }
+            let low = low.map(|row| i32x16::from_slice(simd, &row));
+            let places = sink.places(&low, base);
+            sink.cubes::<_, SIDE>(simd, &places, i32x16::from_slice(simd, &voxels), lanes);
+        }
+        sink.finish(simd);
+        assert!(words == expected, "side {SIDE}, {vectors} vectors");
+    }
+
+    fn index(random: &mut Random, most: usize) -> usize {
+        usize::try_from(random.range(0, i64::try_from(most).unwrap())).unwrap()
+    }
+
+    /// However many wait when there are no more.
+    #[test]
+    fn cubes_are_set_whether_or_not_their_words_were_asked_for() {
+        for level in Instructions::ALL {
+            let mut random = Random::new(13);
+            fearless_simd::dispatch!(level.level(), simd => {
+                for vectors in (0..30).chain([100, 1000]) {
+                    cubes_are_set::<_, 2>(simd, &mut random, vectors);
+                    cubes_are_set::<_, 3>(simd, &mut random, vectors);
+                }
+            });
         }
     }
 }

@@ -51,7 +51,7 @@ impl<V: Simd> Boxes<V> {
     fn layers(&self, clip: &NearClip<V>) -> octants::Layers {
         let mut layers = [[0; 2]; 3];
         for axis in 0..3 {
-            let last = self.extent[axis].min(clip.high[axis] - self.low[axis]);
+            let last = self.high[axis].min(clip.high[axis]) - self.low[axis];
             layers[axis] = [self.low[axis].simd_ge(clip.low[axis]).to_bitmask(), last.simd_ge(1).to_bitmask()];
         }
         layers
@@ -569,7 +569,7 @@ mod tests {
             let (middle, layers) = (middles(&boxes.low, 2), boxes.layers(&clip));
             let longest = boxes.longest.to_float::<f32x16<V>>() * PER_HALF;
             let exact = octants::exact(simd, &corners, middle, layers);
-            let meets = clip.meets(&boxes.low, &[0, 1, 2].map(|i| boxes.low[i] + boxes.extent[i]));
+            let meets = clip.meets(&boxes.low, &boxes.high);
             for lane in (0..LANES).filter(|lane| meets >> lane & 1 != 0) {
                 let corners_of = rows.map(|corner| corner.map(|row| row[lane]));
                 // Alone, so that the others' doubts do not matter.
