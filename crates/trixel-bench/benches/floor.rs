@@ -7,23 +7,20 @@
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark")]
 
 use std::hint::black_box;
-use std::time::Instant;
 
 use trixel::lattice::{LatticeMesh, LatticePositions};
 use trixel::{Backend, CpuBackend, Grid, Job, Mode, Volume};
-use trixel_bench::{inputs, load};
+use trixel_bench::{asked_for, load, median, second_run_ms};
 
 const RESOLUTION: u32 = 512;
 const ROUNDS: usize = 15;
 
 fn main() {
-    let filter = std::env::args().skip(1).find(|argument| !argument.starts_with('-'));
     println!(
         "{:44} {:>6} {:>6} {:>6} {:>6} | {:>7} {:>6} {:>7} {:>6} | {:>7} {:>7} {:>6}",
         "mesh", "box", "clear", "set", "floor", "conserv", "ratio", "2 thr", "gain", "solid", "2 thr", "gain"
     );
-    for name in inputs().into_iter().filter(|name| filter.as_ref().is_none_or(|filter| name.contains(filter.as_str())))
-    {
+    for name in asked_for() {
         let mesh = load(name).unwrap();
         let grid = Grid::fit(&mesh.bounds().unwrap(), RESOLUTION).unwrap();
         let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
@@ -36,9 +33,9 @@ fn main() {
         // Interleaved, so that all see the same neighbours on the machine.
         let mut times: [Vec<f64>; 7] = Default::default();
         for _ in 0..ROUNDS {
-            times[0].push(milliseconds(|| box_every_triangle(&lattice)));
-            times[1].push(milliseconds(|| volume.words_mut().fill(0)));
-            times[2].push(milliseconds(|| {
+            times[0].push(second_run_ms(|| box_every_triangle(&lattice)));
+            times[1].push(second_run_ms(|| volume.words_mut().fill(0)));
+            times[2].push(second_run_ms(|| {
                 let words = volume.words_mut();
                 for &(x, y, z) in &voxels {
                     words[(x as usize * columns + y as usize) * column_words + (z / 64) as usize] |= 1 << (z % 64);
@@ -47,13 +44,13 @@ fn main() {
             for (i, mode) in [Mode::Conservative, Mode::Solid].into_iter().enumerate() {
                 for (j, backend) in backends.iter().enumerate() {
                     let job = Job::new(grid, mode);
-                    times[3 + 2 * i + j].push(milliseconds(|| {
+                    times[3 + 2 * i + j].push(second_run_ms(|| {
                         backend.voxelize(&lattice, &job, &mut volume).unwrap();
                     }));
                 }
             }
         }
-        let [boxes, clear, set, one, two, solid_one, solid_two] = times.map(median);
+        let [boxes, clear, set, one, two, solid_one, solid_two] = times.map(|mut times| median(&mut times));
         let floor = boxes + clear + set;
         println!(
             "{name:44} {boxes:6.2} {clear:6.2} {set:6.2} {floor:6.2} | {one:7.2} {:6.2} {two:7.2} {:6.2} | {solid_one:7.2} \
@@ -63,19 +60,6 @@ fn main() {
             solid_one / solid_two,
         );
     }
-}
-
-/// What the second of two runs takes: caches hold what the work needs, not what another left, and threads are awake.
-fn milliseconds(mut work: impl FnMut()) -> f64 {
-    work();
-    let start = Instant::now();
-    work();
-    start.elapsed().as_secs_f64() * 1e3
-}
-
-fn median(mut samples: Vec<f64>) -> f64 {
-    samples.sort_by(f64::total_cmp);
-    samples[samples.len() / 2]
 }
 
 fn box_every_triangle(lattice: &LatticeMesh<'_>) {

@@ -11,17 +11,15 @@ use std::time::{Duration, Instant};
 
 use trixel::lattice::LatticeMesh;
 use trixel::{Backend, CpuBackend, Grid, Job, Mode, Volume};
-use trixel_bench::{inputs, load};
+use trixel_bench::{asked_for, load, median, second_run_ms};
 
 const RESOLUTION: u32 = 512;
 const TIME_FOR_EACH: Duration = Duration::from_secs(6);
 
 fn main() {
-    let filter = std::env::args().skip(1).find(|argument| !argument.starts_with('-'));
-    println!("{:44} {:28} {:>8} {:>8} {:>26} {:>6}", "mesh", "first / second", "first", "second", "ratio", "turns");
+    println!("{:44} {:32} {:>8} {:>8} {:>26} {:>6}", "mesh", "first / second", "first", "second", "ratio", "turns");
     let backends = [1, 2].map(|threads| CpuBackend::with_threads(threads).unwrap());
-    for name in inputs().into_iter().filter(|name| filter.as_ref().is_none_or(|filter| name.contains(filter.as_str())))
-    {
+    for name in asked_for() {
         let mesh = load(name).unwrap();
         let grid = Grid::fit(&mesh.bounds().unwrap(), RESOLUTION).unwrap();
         let lattice = LatticeMesh::snap(&mesh, &grid).unwrap();
@@ -29,7 +27,7 @@ fn main() {
         let mut compare = |what: &str, modes: [Mode; 2], backends: [&CpuBackend; 2]| {
             let mut time = |which: usize| {
                 let job = Job::new(grid, modes[which]);
-                milliseconds(|| {
+                second_run_ms(|| {
                     backends[which].voxelize(&lattice, &job, &mut volume).unwrap();
                 })
             };
@@ -43,11 +41,11 @@ fn main() {
                 second.push(times[1 - turn]);
                 ratios.push(times[turn] / times[1 - turn]);
             }
-            let [low, middle, high] = median_and_limits(ratios.clone());
+            let [low, middle, high] = median_and_limits(&mut ratios);
             println!(
-                "{name:44} {what:28} {:8.2} {:8.2} {:>26} {:6}",
-                median_and_limits(first)[1],
-                median_and_limits(second)[1],
+                "{name:44} {what:32} {:8.2} {:8.2} {:>26} {:6}",
+                median(&mut first),
+                median(&mut second),
                 format!("{middle:.3} ({low:.3} to {high:.3})"),
                 ratios.len()
             );
@@ -60,19 +58,10 @@ fn main() {
     }
 }
 
-/// What the second of two runs takes: caches hold what the work needs, not what another left, and threads are awake.
-fn milliseconds(mut work: impl FnMut()) -> f64 {
-    work();
-    let start = Instant::now();
-    work();
-    start.elapsed().as_secs_f64() * 1e3
-}
-
 /// The median between the two samples that have it between them 19 times of 20: above and below are as many by chance.
-fn median_and_limits(mut samples: Vec<f64>) -> [f64; 3] {
-    samples.sort_by(f64::total_cmp);
-    let (middle, last) = (samples.len() / 2, samples.len() - 1);
+fn median_and_limits(samples: &mut [f64]) -> [f64; 3] {
+    let middle = median(samples);
     // Two standard deviations of how many of so many tosses of a coin are heads.
-    let spread = samples.len().isqrt();
-    [samples[middle.saturating_sub(spread)], samples[middle], samples[(middle + spread).min(last)]]
+    let (at, spread) = (samples.len() / 2, samples.len().isqrt());
+    [samples[at.saturating_sub(spread)], middle, samples[(at + spread).min(samples.len() - 1)]]
 }

@@ -6,6 +6,7 @@
 
 mod cpu_name;
 mod subjects;
+mod timing;
 
 pub mod compare;
 pub mod fills;
@@ -18,4 +19,5 @@ pub mod results;
 pub mod text;
 
 pub use results::{Adapter, Cell, ListCell, Machine, Results, Sweep};
-pub use subjects::{MODELS, SCENES, inputs, load, models_folder};
+pub use subjects::{MODELS, SCENES, asked_for, inputs, load, models_folder};
+pub use timing::{median, second_run_ms};

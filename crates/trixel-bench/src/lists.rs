@@ -6,9 +6,10 @@ use trixel::lattice::LatticeMesh;
 use trixel::{Bytes, Job, Mode, Volume, VoxelOrder, voxel_list};
 use trixel_gpu::{Gpu, GpuMesh, ListMethod, Options, Voxelizer};
 
-use crate::measure::{MeasureError, median};
+use crate::measure::MeasureError;
 use crate::results::{ListCell, Results};
 use crate::text::{aligned, ms};
+use crate::timing::median;
 
 /// The methods that list voxels of a mode.
 pub(crate) fn methods(mode: Mode) -> impl Iterator<Item = ListMethod> {

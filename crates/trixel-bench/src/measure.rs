@@ -9,6 +9,7 @@ use trixel_gpu::{Cutoff, Gpu, GpuError, GpuMesh, GpuVolume, Heuristic, Options, 
 use crate::cpu_name::cpu_name;
 use crate::lists;
 use crate::results::{Adapter, Cell, Machine, Results, SCHEMA, Sweep};
+use crate::timing::median;
 
 /// What to measure on every mesh.
 #[derive(Clone, Debug)]
@@ -257,12 +258,6 @@ fn time(voxelizer: &mut Voxelizer, mesh: &GpuMesh, volume: &GpuVolume) -> Result
     let start = Instant::now();
     voxelizer.run(mesh, volume)?;
     Ok(start.elapsed().as_secs_f64() * 1e3)
-}
-
-/// Sorts; 0 of none.
-pub(crate) fn median(times: &mut [f64]) -> f64 {
-    times.sort_by(f64::total_cmp);
-    times.get(times.len() / 2).copied().unwrap_or(0.0)
 }
 
 fn wrong_voxels(gpu: &Gpu, volume: &GpuVolume, right: &Volume) -> Result<u64, MeasureError> {

@@ -34,6 +34,13 @@ pub fn inputs() -> Vec<&'static str> {
     SCENES.iter().chain(MODELS.iter().filter(present)).copied().collect()
 }
 
+/// Those of [`inputs`] in which the first word of the command line is that is no option, or all.
+#[must_use]
+pub fn asked_for() -> Vec<&'static str> {
+    let word = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
+    inputs().into_iter().filter(|name| name.contains(&word)).collect()
+}
+
 /// A mesh by a name from [`inputs`]; `None` if it cannot be read.
 #[must_use]
 pub fn load(name: &str) -> Option<Mesh> {
